@@ -17,16 +17,17 @@ more places were touched, softly and hard, the better. An electrode whose gain t
 keeps gain 1, and a warning says so. Rectified recordings give no offsets. The gains' uncertainty is printed; fewer than
 five different contacts give none.
 
-Three raw recordings or more also give the unit's fluid film, and its rest, from those of the lowest fluid pressure (of
-the least squeezed electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor`
-takes it for recordings that begin and end in contact. Files of several fingers give a section a finger: these are units
-of their own. --rest takes it from a recording of the untouched finger. Recordings of a BioTac SP, which all begin in
-contact and have no PDC, give only film and rest: those with which simulated contacts explain them best.
+Three raw recordings or more also give the unit's fluid film, its rest, and how far each electrode's rest may be off.
+Rest comes from those of the lowest fluid pressure (without PDC, of the least squeezed electrodes), or with --rest from
+a recording of the untouched finger. `tactile convert --sensor` uses it for recordings that begin and end in contact.
+Files of several fingers give a section for each finger, since each is a unit. Recordings of a BioTac SP all begin in
+contact and have no PDC. They give only film and rest: those with which simulated contacts explain them best.
 
---force gives the unit a stiffness, by which its force and pressure are larger than those of the typical unit under the
-same signals: newtons in one column or three (x, y, z), in rows as the first recording's, or behind a column of time; or
-columns of the recordings' own files. The lag is found. The scale is fitted on the first half of the frames and judged
-on the second: where force is no better there with it than without, it is not written, and both errors are said."""
+--force gives the unit a stiffness, the factor by which its force and pressure exceed those of the typical unit under
+the same signals. It names a file with newtons in one column or three (x, y, z), in rows as the first recording's or
+behind a column of time; or it names columns of the recordings' own files. The lag is found. The scale is fitted on the
+first half of the frames and judged on the second. It is not written if force is no better there with it than without.
+Both errors are printed."""
 EPILOG = """\
 example:
   tactile adapt day1/*.csv --out sensor.toml
@@ -39,11 +40,11 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="recordings of one unit, in any known layout")
     verb.add_argument("--out", required=True, metavar="FILE", help="new TOML file to write")
-    verb.add_argument("--rest", metavar="FILE", help="recording of the untouched finger, whose rest is then known")
+    verb.add_argument("--rest", metavar="FILE", help="recording of the untouched finger, which gives the rest")
     verb.add_argument(
         "--force",
         metavar="FILE|COLUMNS",
-        help="force measured beside the first RECORDING, N; or its columns in the recordings, as fx,fy,fz",
+        help="file of the force measured beside the first RECORDING, N; or columns of the recordings, as fx,fy,fz",
     )
     add(verb, "--polarity", "--columns", "--weights")
 

@@ -22,9 +22,9 @@ Convert recordings into the job folder DIR:
   shards/       HDF5 files, each of some frames of one recording, laid out as frames.h5; pictures are inside
   aside/        recordings and shards that failed, and why; the next run tries them again
   manifest.json all shards and their hashes, once the job is done
-Only missing or damaged shards are made, so the same command continues after any interruption; without INPUTS it does
-not check whether recordings changed. The bytes do not depend on the number of workers. INPUTS are files, folders, globs
-(quoted) and @LIST, a text file with one path a line."""
+Only missing or damaged shards are made, so the same command continues after any interruption. Without INPUTS it
+does not check whether recordings changed. The bytes do not depend on the number of workers. INPUTS are files, folders,
+globs (quoted) and @LIST, a text file with one path a line."""
 EPILOG = """\
 examples:
   tactile batch day1 'day2/*.csv' --out job --workers 8
@@ -43,7 +43,7 @@ RECIPE = (  # options that decide what is made, which goes on as it was begun
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; without any, the job in DIR goes on")
+    verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; without any, the job in DIR continues")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
     add(verb, "--keep", *UNIT)
     verb.set_defaults(keep="latent,displacement")
@@ -53,7 +53,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--preset", choices=PRESETS, help=about)
     add(verb, *PREPARE)
     engine.place_arguments(verb)
-    verb.add_argument("--array", metavar="I/N", help="do part I of N alone (from 0), others do the rest")
+    verb.add_argument("--array", metavar="I/N", help="do only part I of N, counted from 0; other processes do the rest")
     doing = verb.add_mutually_exclusive_group()
     doing.add_argument("--plan", action="store_true", help="write job.json, print what 1,000 frames cost, and stop")
     doing.add_argument("--status", action="store_true", help="print how much of the job is done; changes nothing")

@@ -21,19 +21,20 @@ if TYPE_CHECKING:
 BRIEF = "fit camera, lights and colours of a gel to photographs of a ball"
 TEXT = """\
 Fit a unit's calibration to photographs of a ball pressed into its gel, anywhere and to any depth: positions of camera
-and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
+and lights, their extent, colours, scale. Without a photograph of the untouched gel, the median of the photographs
 takes its place. Ten presses spread over the gel are best; five or even one suffice, since parameters that presses do
-not determine stay near those of --start, and are named. Writes the calibration, and a sheet to look at (.png).
+not determine stay near those of --start, and are named. The command writes the calibration and a sheet to look at
+(.png).
 
-A video (AVI, MP4; extra [camera]) stands for a folder: its deepest frame of each press is taken, and some of the
-untouched gel. Balls of several sizes: a folder or video for each, and their diameters in that order.
+A video (AVI, MP4; extra [camera]) may stand for a folder. The deepest frame of each press is used, and some of the
+untouched gel. For balls of several sizes give a folder or video each, and the diameters in that order.
 
-The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
+Where LLVM works, the fit ends on Mitsuba's own pictures, with the light of one bounce; --quick leaves that out.
 
-With --test, a calibration is tested on photographs instead: only place and depth of each press are fitted, and the
+With --test, a calibration is tested on photographs instead. Only place and depth of each press are fitted, and the
 picture is compared with the photograph. The baseline is the background alone. What touches the gel shows through its
-coating by its reflectance: that of --object-reflectance or the file, but in rows named `through` that of the other
-photographs."""
+coating by its reflectance. That is taken from --object-reflectance or the file, but in rows named `through` from the
+other photographs."""
 EPILOG = """\
 examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
@@ -47,10 +48,10 @@ TRIED = ("fast", "standard", "quality")  # presets
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    about = "folder of photographs, or video, of one unit, fingertip up; for each ball one"
+    about = "folder of photographs, or video, of one unit, fingertip up; one for each ball"
     verb.add_argument("presses", metavar="PRESSES", nargs="+", help=about)
     verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
-    about = "diameter of the ball, or for each PRESSES one, separated by commas (with --test: as fitted, the first)"
+    about = "diameter of the ball, or one for each PRESSES, with commas (with --test: the first; default: as fitted)"
     verb.add_argument("--ball-diameter", type=_millimetres, metavar="MM", help=about)
     verb.add_argument("--background", metavar="FILE", help="photograph of the untouched gel (default: estimated)")
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the unit (default: that of --start, else digit)")

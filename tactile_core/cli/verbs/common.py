@@ -22,16 +22,16 @@ MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 
 # What several verbs offer: the words of argparse; {words} in a help are the verb's own.
 OPTIONS: dict[str, dict[str, Any]] = {
-    "--progress": {"action": "store_true", "help": "show the bar of progress even where stderr is no terminal"},
+    "--progress": {"action": "store_true", "help": "show the progress bar even if stderr is no terminal"},
     "--keep": {"metavar": "WORDS", "help":
         "additional outputs, out of latent,displacement,height,image,traction,marker_motion (default: %(default)s)"},
     "--tare": {"default": "auto", "metavar": "auto|none|A:B", "help":
         "frames without contact{among} that give the resting reading (default: found automatically)"},
     "--kind": {"choices": ("raw", "tared", "scaled", "rectified"), "help":
-        "what the electrodes' numbers are, where `tactile info` guesses wrong: raw, readings of 0 to 4095; tared,"
-        " changes against rest; scaled, changes in another unit; rectified, changes without their sign"},
+        "what the electrodes' numbers are, if `tactile info` guesses wrong: raw (readings of 0 to 4095), tared (changes"
+        " against rest), scaled (changes in another unit) or rectified (changes without their sign)"},
     "--polarity": {"choices": ("auto", "falls", "rises"), "default": "auto", "help":
-        "direction of the counts where the fluid film over an electrode gets thinner: raw counts fall, files that"
+        "how counts change where the fluid film over an electrode gets thinner: raw counts fall; those of files that"
         " hold rest minus reading rise (default: as the file states, else as the recording shows)"},
     "--columns": {"metavar": "MAP.toml", "help":
         "map of the columns, fields or arrays of a file in no known layout; `tactile info --columns` writes one"},
@@ -40,34 +40,35 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "average over N frames, odd (default: 3 if rectified, else 1)"},
     "--no-drift": {"action": "store_true", "help": "do not remove drift"},
     "--answer": {"choices": ("likely", "mean"), "default": "likely", "help":
-        "estimate of a frame: likely, its most plausible contact; mean, the mean over all its plausible contacts,"
-        " each frame alone, which is blurred where two places fit the signals (default: likely)"},
+        "estimate of a frame: likely (its most plausible contact) or mean (over all its plausible contacts, each frame"
+        " alone; blurred where two places fit the signals) (default: likely)"},
     "--frames-apart": {"action": "store_true", "help":
         "translate each frame alone, instead of following the contact through the frames before and after"},
     "--mount-shift": {"metavar": "X,Z", "help":
-        "mount the BioTac elsewhere on the DIGIT: shift all contacts by X mm along the finger (+x is from the tip"
-        " to the base; a negative X: --mount-shift=-4,0) and Z mm across it, so that those at the tip come into the"
-        " picture"},
+        "shift all contacts by X mm along the finger (+x is from the tip to the base) and Z mm across it, as if the"
+        " BioTac were mounted elsewhere on the DIGIT; so those at the tip come into the picture (write a negative X"
+        " as --mount-shift=-4,0)"},
     "--samples": {"type": int, "default": 0, "metavar": "N", "help":
         "also draw N contacts a frame from the posterior, as sample_center and sample_force in frames.h5"},
     "--contacts": {"type": int, "choices": (1, 2), "default": 1, "help":
-        "2: look for a second contact in each frame and add it to skin and gel, as second_center and second_force in"
-        " frames.h5; a single wide contact of a real finger is mostly taken for two (default: 1)"},
+        "2: look for a second contact in each frame, add it to skin and gel, and write second_center and second_force"
+        " to frames.h5; a single wide contact of a real finger is mostly taken for two (default: 1)"},
     "--gel": {"default": "translated", "metavar": "HOW", "help":
-        "displacement of the gel: translated, by the networks; solved, by contact mechanics, a ball of the"
-        " dent's curvature at the estimated place and force, 24 ms a frame, needs scipy; ball:28, the same under a"
-        " ball of 28 mm, where you know what touched (a plate: ball:2000) (default: translated)"},
+        "how the gel's displacement is found: translated (by the networks); solved (contact mechanics press a ball of"
+        " the dent's curvature at the estimated place and force; 24 ms a frame, needs scipy); ball:28 (the same with a"
+        " ball of 28 mm, if you know what touched; ball:2000 for a plate) (default: translated)"},
     "--sensor": {"metavar": "FILE", "help": "rest, film, gains and offsets of the BioTac unit, from `tactile adapt`"},
     "--to": {"dest": "target", "default": TARGET, "metavar": "SENSOR", "help":
-        "gel to translate to: any sensor with a gel (docs/extend.md); where the networks do not lead to it, its"
-        " displacement is solved by contact mechanics (default: %(default)s)"},
+        "gel to translate to: any sensor with a gel (docs/extend.md); if the networks do not lead to it, contact"
+        " mechanics solve its displacement (default: %(default)s)"},
     "--weights": {"metavar": "DIR", "help": "networks from `tactile train` (default: those that ship)"},
     "--calibration": {"metavar": "FILE", "help":
         "camera and lights, by `tactile calibrate` (default: those that ship)"},
     "--object-reflectance": {"type": float, "metavar": "R", "help":
         "reflectance, 0 black to 1 white, of {whose}; it shows through the gel's coating"},
     "--error": {"metavar": "BOUND", "help": "the largest error that the toolkit itself may add: {bound}"},
-    "--seed": {"type": int, "default": 0, "metavar": "S", "help": "random seed; same seed, same {same} (default: 0)"},
+    "--seed": {"type": int, "default": 0, "metavar": "S", "help":
+        "random seed; the same seed gives the same {same} (default: 0)"},
 }  # fmt: skip
 # Options that go together: how readings become signals, the estimate for a frame (``translation.answer``), and what
 # translates between which units.

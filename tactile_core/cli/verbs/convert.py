@@ -24,12 +24,12 @@ Translate recordings and draw them. Each gets the folder DIR/<file name without 
   contact_sheet.png  a few frames to look at
   note.json          versions, weights, options, warnings
   timings.json       ms a frame of each stage
-One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
-A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one. A bag
-of several topics gives one a topic and finger, <name>_<topic>_finger0; hands.bag#left/biotac/finger0 picks one.
+Each data row gives one frame, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
+A file of several fingers gives a result for each, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one. A bag of
+several topics gives one for each topic and finger, <name>_<topic>_finger0; hands.bag#left/biotac/finger0 picks one.
 
---error 0.6levels picks the cheapest preset of `tactile render` whose measured error, rms grey levels of a picture of
-the same gel, is at most that (without --error: fast). The networks' own error is in frames.h5 and on the sheet."""
+--error 0.6levels picks the cheapest preset of `tactile render` (default: fast) whose measured error, for pictures of
+the same gel, is at most 0.6 grey levels rms. The networks' own error is in frames.h5 and on the sheet."""
 # 4 B per number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
@@ -43,11 +43,11 @@ examples:
 
 Words of --keep, beside what frames.h5 always holds:
   latent         the networks' codes of the signals and of both surfaces
-  displacement   of the BioTac's skin and the gel, m at each node of their surfaces
+  displacement   of the BioTac's skin and of the gel, m at each node of their surfaces
   height         the gel's height under each pixel of the camera, m
   image          the camera's pictures, as PNG files
   traction       force field on the gel, Pa at each node of its surface, by the gel's own compliance (unpacked once,
-                 some seconds, 151 MB), as large in all as the networks' force
+                 some seconds, 151 MB); it adds up to the networks' force
   marker_motion  motion, px, of dots printed on the gel, for a --calibration with [markers]
 
 Size of a 700-frame result, measured: {SIZES}."""
@@ -72,8 +72,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         dest="run",
         action="store_const",
         const=reverse,
-        help="the other way: from the DIGIT's gel in frames.h5, or in a simulated recording, to the BioTac's"
-        " skin, force and electrodes, into the HDF5 file --out; takes --frames, --weights, --to and --overwrite alone",
+        help="translate the other way: from the DIGIT's gel in frames.h5, or in a simulated recording, to the BioTac's"
+        " skin, force and electrodes, in the HDF5 file --out; takes only --frames, --weights, --to and --overwrite",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     add(verb, *PREPARE)

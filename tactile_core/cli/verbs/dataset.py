@@ -13,11 +13,11 @@ from .export import LAYOUTS
 
 BRIEF = "convert a whole data set, from its folder to labelled pictures with a card"
 TEXT = """\
-List the data sets that are known, or convert one. A recipe, one TOML file a set, says which files of FOLDER are
+List the data sets that are known, or convert one. A recipe, one TOML file per set, says which files of FOLDER are
 recordings, how their units are found, what is held out for testing, and whose the data are. DIR then holds
-  README.md     card: what it was made from, how far to trust it, what of its labels survives (with scikit-learn)
+  README.md     card: what it was made from, how far to trust it, how much of its labels survives (with scikit-learn)
   index.html    every recording as a strip of pictures, filtered by label and flag; needs no network
-  imagefolder/  pictures and metadata.csv, as Hugging Face's library `datasets` loads them; and other layouts asked for
+  imagefolder/  pictures and metadata.csv, as Hugging Face's library `datasets` loads them; other layouts by --to
   units/ jobs/  the file of `tactile adapt` of each unit, and the jobs of `tactile batch`
 The same command continues after any interruption. For a set of your own, --new writes a recipe to fill in."""
 EPILOG = """\

@@ -1,4 +1,4 @@
-"""``tactile doctor``: tell what works on this machine, and how more would."""
+"""``tactile doctor``: check which libraries work on this machine, and how to get more."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ..terminal import tell
 
 BRIEF = "check which libraries work here, and how to get more"
 TEXT = """\
-Say which libraries are here, what each is for, and how Mitsuba draws: compiled by LLVM, or one ray at a time without
-it. Each library is tried in a process of its own, so that a broken one breaks nothing; this takes some seconds."""
+Print which libraries are here, what each is for, and how Mitsuba draws: compiled by LLVM, or without LLVM one ray at
+a time. Each library is tried in a process of its own, so that a broken one breaks nothing; this takes some seconds."""
 EPILOG = """\
 example:
   tactile doctor"""

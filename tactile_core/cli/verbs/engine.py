@@ -23,12 +23,12 @@ ASSEMBLES = "the command that planned it, without --plan, which makes the result
 def place_arguments(verb: argparse.ArgumentParser) -> None:
     """Add ``--workers``, ``--cluster`` and ``--insecure``, which say where tasks run."""
     where = verb.add_mutually_exclusive_group()
-    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; bytes stay the same")
+    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; bytes do not depend on N")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
     verb.add_argument(
         "--insecure",
         action="store_true",
-        help="with --cluster: no TLS; only in a network that is yours alone, as Dask's messages can run code",
+        help="with --cluster: use no TLS; only in a network that is yours alone, since Dask's messages can run code",
     )
 
 

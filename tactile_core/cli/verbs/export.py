@@ -10,18 +10,18 @@ from .common import add
 BRIEF = "write a finished batch job as NPZ, PNG, OpenEXR or LeRobot data"
 TEXT = """\
 Write the shards of a finished job (see `tactile batch`) as
-  npz      one NPZ file a recording, all arrays
-  png      a folder of pictures a recording (the job must have kept image)
+  npz      one NPZ file per recording, with all arrays
+  png      a folder of pictures per recording (the job must have kept image)
   imagefolder
            PNG pictures in folders train and test, with their labels and numbers in metadata.csv, as Hugging Face's
            library `datasets` loads them (the job must have kept image)
-  exr      a folder of OpenEXR files a recording: heights in metres and pictures, as far as they were kept
+  exr      a folder of OpenEXR files per recording: heights in metres and pictures, as far as they were kept
            (needs OpenEXR: see `tactile doctor`)
   lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: see `tactile doctor`)
   lerobot21
-           the same in LeRobot v2.1, which GR00T reads too: a file and a video an episode (needs pyarrow and OpenCV)
-In LeRobot's data sets observation.state is force (N), place (m) and contact (0 or 1), action that of the next frame;
-what is not known is 0, and labels are the strings labels.NAME."""
+           the same in LeRobot v2.1, which GR00T reads, too: a file and a video per episode (needs pyarrow and OpenCV)
+In LeRobot's data sets observation.state is force (N), place (m) and contact (0 or 1), and action is the
+state of the next frame. Unknown values are 0, and labels are the strings labels.NAME."""
 EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""

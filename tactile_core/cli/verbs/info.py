@@ -11,13 +11,14 @@ from .common import PREPARE, add, prepare_words
 
 BRIEF = "describe recordings, or a sensor"
 TEXT = """\
-Describe recordings: sensor, channels, rate, duration, polarity, resting frames (tare), gaps, bad samples. Of a CSV
-file of a BioTac SP: finger, lines, labels and the counts of its 24 electrodes; with --sensor also the changes against
-the unit's rest, which recordings that begin in contact do not show.
+Describe recordings: sensor, channels, rate, duration, polarity, resting frames (tare), gaps, bad samples. For a
+CSV file of a BioTac SP: finger, lines, labels and the counts of its 24 electrodes. With --sensor also the changes
+against the unit's rest, which recordings that begin in contact do not show.
 
-A file whose columns, fields or arrays have names of no known layout needs a map (CSV, also without a header, JSON,
-HDF5, NPZ, NPY, MATLAB, and long tables with a row for each value): --columns map.toml writes one, guessed from names
-and values of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch.
+A file whose columns, fields or arrays have names of no known layout needs a map. It may be CSV, also without a header,
+JSON, HDF5, NPZ, NPY, MATLAB, or a long table with a row for each value. --columns map.toml writes a map if there is
+none yet, guessed from names and values of the first file. Check it, then give it to info, convert, batch, adapt and
+watch.
 
 Without a recording, --sensor NAME describes a sensor: one that ships, or one in the folder $TACTILE_SENSORS."""
 EPILOG = """\

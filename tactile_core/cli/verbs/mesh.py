@@ -1,4 +1,4 @@
-"""``tactile mesh``: meshes for other tools."""
+"""``tactile mesh``: write the mesh of a sensor for other tools."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 BRIEF = "write the mesh of a sensor for other tools"
 TEXT = """\
 Write the mesh of a sensor in metres, x along the finger, -y out of the pad. The ending of --out chooses the format:
-  .ply  surface with normals, read by MeshLab, Blender and trimesh; numbers of each vertex beside its place
+  .ply  surface with normals and numbers of each vertex, read by MeshLab, Blender and trimesh
   .stl  surface alone
   .vtu  volume of 27-node hexahedra, read by ParaView (Warp By Vector shows the deformation) and meshio
 
 The sensor is at rest, deformed as in a frame of frames.h5 or of a simulated recording (--frames, surface alone), or
-pressed (--press). A press holds displacement (m) and contact; the tiers full and reference solve the volume and add
-the force on each node (N), Cauchy stress and von Mises stress (Pa). The fast tier solves the surface alone."""
+pressed (--press). The mesh of a press holds displacement (m) and contact. The full and reference tiers solve the
+volume, and add the force on each node (N), Cauchy stress and von Mises stress (Pa). The fast tier solves the surface
+alone."""
 EPILOG = """\
 examples:
   tactile mesh biotac --out biotac.ply
@@ -41,24 +42,24 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--out", required=True, metavar="FILE", help="new file to write: .ply, .stl or .vtu")
     frame = verb.add_argument_group("deformed by a frame")
     frame.add_argument("--frames", metavar="FILE.h5", help="frames.h5 of `tactile convert`, or a simulated recording")
-    frame.add_argument("--frame", type=int, metavar="N", help="which one, by its number in the recording, from 0")
+    frame.add_argument("--frame", type=int, metavar="N", help="which frame, by its number in the recording, from 0")
     press = verb.add_argument_group("deformed by a press")
     about = "sphere or cylinder, of --diameter; or a scene, for its indenter"
     press.add_argument("--press", metavar="WHAT", help=about)
-    press.add_argument("--diameter", type=float, metavar="MM", help="of the sphere or cylinder")
+    press.add_argument("--diameter", type=float, metavar="MM", help="diameter of the sphere or cylinder")
     press.add_argument("--indenter", metavar="NAME", help="which indenter of the scene (default: its first)")
-    press.add_argument("--depth-mm", type=float, metavar="MM", help="from first touch")
-    press.add_argument("--force-n", type=float, metavar="N", help="instead of the depth: force along the motion")
+    press.add_argument("--depth-mm", type=float, metavar="MM", help="depth from first touch")
+    press.add_argument("--force-n", type=float, metavar="N", help="force along the motion, instead of the depth")
     press.add_argument(
         "--x-mm",
         type=float,
         default=-8.0,
         metavar="MM",
-        help="place on the DIGIT's plane, onto which the BioTac rolls (default: -8, the middle)",
+        help="place along the DIGIT's plane, onto which the BioTac rolls (default: -8, the middle)",
     )
-    press.add_argument("--z-mm", type=float, default=0.0, metavar="MM", help="likewise, across (default: 0)")
-    press.add_argument("--tilt-deg", type=float, default=0.0, metavar="DEG", help="off the normal (default: 0)")
-    press.add_argument("--tier", choices=TIERS, help="how exactly: milliseconds, seconds or minutes (default: fast)")
+    press.add_argument("--z-mm", type=float, default=0.0, metavar="MM", help="place across the finger (default: 0)")
+    press.add_argument("--tilt-deg", type=float, default=0.0, metavar="DEG", help="angle off the normal (default: 0)")
+    press.add_argument("--tier", choices=TIERS, help="solver; takes milliseconds, seconds or minutes (default: fast)")
 
 
 def run(options: argparse.Namespace) -> int:

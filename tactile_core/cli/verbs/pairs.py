@@ -37,7 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         ("--to", "target", TARGET, "gel to translate to (default: %(default)s); yours is a folder in $TACTILE_SENSORS"),
     ):
         verb.add_argument(word, dest=role, default=sensor, metavar="SENSOR", help=about)
-    about = "traction: the force field on both surfaces, too, Pa on each node, float32"
+    about = "traction: also keep the force field on both surfaces, Pa on each node, float32"
     verb.add_argument("--keep", metavar="WORDS", help=about)
     engine.parts_arguments(verb, "print the cost, write the job into OUT.parts and stop")
     add(verb, "--progress")

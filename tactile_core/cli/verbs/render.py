@@ -30,20 +30,21 @@ DIR is a new folder, which appears whole or not at all:
   exr/%05d.exr     with --exr, float32: linear radiance of the coating, R, G, B = light of the red, green, blue LED
   rest.exr         the same of the undeformed gel;  camera.exr  response and ambient light
   FILE.xml         with --scene-out: the first frame's LEDs, coating and gel for `mitsuba FILE.xml`, FILE.ply beside it;
-                   without the light that the coating spreads: its first comment names the Gaussian to lay over
+                   the coating spreads no light there: the first comment names the Gaussian filter to apply
   note.json        input, calibration, preset, versions;  timings.json  ms a frame
 
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (`tactile doctor` says how).
   fast       direct light, soft shadows            standard   direct light, traced, and a coarse bounce
   quality    more points of light, a finer bounce  reference  Mitsuba's path integrator, half a minute a frame
-With LLVM, Mitsuba renders a scene: LEDs as lamps, the coating as a material, the window. Without it the coating is
-matte, and standard and quality have no window; pictures differ by a tenth of a level. `tactile doctor` says which runs.
+With LLVM, Mitsuba renders a scene of LEDs as lamps, the coating as a material, and the window. Without LLVM the coating
+is matte, and standard and quality have no window; pictures differ by a tenth of a level. `tactile doctor` says whether
+LLVM is found.
 
---error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
-that, and says why. How exact a scene's contacts are is chosen by `tactile simulate --error 50um`.
+--error 0.6levels picks the cheapest preset whose measured error (rms from the full model of the same gel) is at most
+0.6 levels, and says why. How exact a scene's contacts are is chosen by `tactile simulate --error 50um`.
 
-With --workers, --cluster or --plan frames are rendered in other processes, to the same bytes. They wait in OUT.parts
-until all are there, and the same command goes on after any interruption; no timings.json is written."""
+With --workers, --cluster or --plan other processes render the frames, to the same bytes. Frames wait in OUT.parts until
+all are there, and the same command continues after any interruption. No timings.json is written."""
 EPILOG = """\
 examples:
   tactile render results/touch/frames.h5 --out pictures --frames 100:200

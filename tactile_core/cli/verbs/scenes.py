@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 BRIEF = "list or copy the example scenes and other example files"
 TEXT = """\
 List the example scenes and other example files that ship, or copy them (all, or those named) into the folder scenes,
-where the examples of every page look for them. One that is there already is refused, not written over."""
+where the examples of every page look for them. An example that is there already is not overwritten, but refused."""
 EPILOG = """\
 examples:
   tactile scenes

@@ -1,4 +1,4 @@
-"""``tactile simulate``: the recording of a scene."""
+"""``tactile simulate``: simulate the recording of a scene."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ TEXT = """\
 Simulate the recording that a scene describes. The file is marked as simulated and holds the true meshes. Only sensors
 that --keep needs are solved: electrodes, displacement_biotac and traction_biotac need the BioTac, the others the DIGIT.
 
---error 50um picks for each sensor the cheapest tier of contact mechanics whose measured error is at most 50 um (rms of
-the surface, which 95 of 100 contacts stay below, to the depth that the scene reaches), and prints which; without it:
-fast. The full and reference tiers print their cost first; for more than a minute they ask, or need --yes.
+--error 50um picks for each sensor the cheapest tier of contact mechanics (default: fast) whose measured error is at
+most 50 um, and prints it. The error is the rms of the surface that 95 of 100 contacts stay below, to the depth that the
+scene reaches. The full and reference tiers print their cost first; for more than a minute they ask, or need --yes.
 
-With --grid many recordings are simulated into a folder, with grid.json, which lists the values of each. They wait in
-OUT.parts until all are there, and the same command goes on after any interruption."""
+--grid simulates many recordings into a folder, with grid.json, which lists the values of each. Recordings wait in
+OUT.parts until all are there, and the same command continues after any interruption."""
 EPILOG = """\
 examples:
   tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
@@ -57,10 +57,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--grid",
         action="append",
         metavar="NAME=A:B:N",
-        help="a recording for each of N values from A to B, or NAME=V,V,...; given again, for each combination."
+        help="simulate a recording for each of N values from A to B, or for V,V,...; repeat it for all combinations."
         " NAME is force_n (the greatest force), x_mm, z_mm (where that is), or a field of the scene such as"
-        " recording.tilt_deg or indenters.0.radius_mm. --out is then a folder; the first recording has --seed, each"
-        " one more than that before it",
+        " recording.tilt_deg or indenters.0.radius_mm. --out is then a folder; the first recording has --seed, the"
+        " next --seed + 1, and so on",
     )
     about = "print what is built and its cost, and stop; with --grid print no cost, write the job into OUT.parts"
     engine.parts_arguments(verb, about)

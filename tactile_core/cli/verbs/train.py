@@ -1,4 +1,4 @@
-"""``tactile train``: the networks, from pairs."""
+"""``tactile train``: train the networks on pairs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .common import RESUMES, add, check_seed
 
 BRIEF = "train the networks on pairs, or fine-tune one"
 TEXT = """\
-Train the networks and the force estimate on simulated pairs; or, with the word s2mpn in place of the pairs, fine-tune
+Train the networks and the force estimate on simulated pairs. With the word s2mpn in place of the pairs, fine-tune
 that one network on a real sensor's recording that says where and how hard it was touched (HDF5 with
 electrode_vals/data, contact_loc/data, force_vec/data). DIR/weights then holds weights and card."""
 EPILOG = """\
@@ -38,7 +38,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="factor on all epochs (default: 1)")
     verb.add_argument("--without", action="append", default=[], metavar="NAME", help="indenter to leave out")
     verb.add_argument("--without-below-x", type=float, metavar="MM", help="leave out contacts at smaller x")
-    what = "auto (default) is a GPU where torch sees one; weights repeat to the byte on the same device only"
+    what = "auto (default) takes a GPU if torch sees one; weights repeat to the byte only on the same device"
     verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
     verb.add_argument("--overwrite", action="store_true", help="train again over older weights in DIR")
     add(verb, "--progress")

@@ -25,7 +25,7 @@ Follow a CSV recording while another program writes it, and show the newest fram
 a PNG file that is replaced with each picture. --serve publishes the frames for other programs of this machine
 (docs/read_frames.py reads them), and --camera shows the camera of a real DIGIT beside the simulated picture.
 With --play or --rosbag-play a finished recording is played at its own pace, or --speed times as fast. Rest is taken
-from the first quiet part: begin without contact, or name frames by --tare, or a unit whose rest is known by --sensor.
+from the first quiet part, so begin without contact; or name frames by --tare, or a unit's known rest by --sensor.
 The time from frame to picture, and how much of it was computing, is printed each second and at the end."""
 EPILOG = """\
 examples:
