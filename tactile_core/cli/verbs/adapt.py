@@ -15,13 +15,13 @@ Fit a gain and an offset to each electrode of a BioTac, so that its readings in 
 that the networks were trained on. Recordings of one sensor are taken together; what touched it need not be known. The
 more places were touched, softly and hard, the better. An electrode whose gain the recordings do not determine
 keeps gain 1, and a warning says so. Rectified recordings give no offsets. The gains' uncertainty is printed; fewer than
-five different contacts give none.
+five different contacts give no gains.
 
 Three raw recordings or more also give the unit's fluid film, its rest, and how far each electrode's rest may be off.
-Rest comes from those of the lowest fluid pressure (without PDC, of the least squeezed electrodes), or with --rest from
-a recording of the untouched finger. `tactile convert --sensor` uses it for recordings that begin and end in contact.
-Files of several fingers give a section for each finger, since each is a unit. Recordings of a BioTac SP all begin in
-contact and have no PDC. They give only film and rest: those with which simulated contacts explain them best.
+Rest comes from the recordings of the lowest fluid pressure (without PDC, of the least squeezed electrodes), or with
+--rest from one of the untouched finger. `tactile convert --sensor` uses it for recordings that begin and end in
+contact. Files of several fingers give a section for each finger, since each is a unit. Recordings of a BioTac SP all
+begin in contact and have no PDC. They give only film and rest: those with which simulated contacts explain them best.
 
 --force gives the unit a stiffness, the factor by which its force and pressure exceed those of the typical unit under
 the same signals. It names a file with newtons in one column or three (x, y, z), in rows as the first recording's or

@@ -24,8 +24,9 @@ Simulate the recording that a scene describes. The file is marked as simulated a
 that --keep needs are solved: electrodes, displacement_biotac and traction_biotac need the BioTac, the others the DIGIT.
 
 --error 50um picks for each sensor the cheapest tier of contact mechanics (default: fast) whose measured error is at
-most 50 um, and prints it. The error is the rms of the surface that 95 of 100 contacts stay below, to the depth that the
-scene reaches. The full and reference tiers print their cost first; for more than a minute they ask, or need --yes.
+most 50 um, and prints the tier. The error is the rms of the surface that 95 of 100 contacts stay below, to the depth
+that the scene reaches. The full and reference tiers print their cost first; for more than a minute they ask, or
+need --yes.
 
 --grid simulates many recordings into a folder, with grid.json, which lists the values of each. Recordings wait in
 OUT.parts until all are there, and the same command continues after any interruption."""
