@@ -144,9 +144,11 @@ class _Seen:
         simulated contact, that contact's index (n,), and their squared length (n,); on an asinh scale."""
         seen = np.arcsinh(typical / SCALE)
         length = np.square(seen).sum(axis=1)
-        apart = length[:, None] - 2 * seen @ self._known.T + self._squares
-        nearest = apart.argmin(axis=1)
-        return np.maximum(apart[np.arange(len(seen)), nearest], 0), nearest, np.maximum(length, 1e-9)
+        beyond = -2 * seen @ self._known.T  # (n, contacts), millions: worked on in place
+        beyond += self._squares
+        nearest = beyond.argmin(axis=1)
+        apart = length + beyond[np.arange(len(seen)), nearest]
+        return np.maximum(apart, 0), nearest, np.maximum(length, 1e-9)
 
     def unexplained(self, typical: np.ndarray) -> np.ndarray:
         """Return the share (n,) of the squared length of changes typical (n, e) counts, on an asinh scale, that no
