@@ -180,11 +180,11 @@ def test_an_idle_finger_whose_fluid_warms_is_hardly_touched(forced):
 
 
 def of_unit(recording, rest):
-    """Touched frames (n,) bool, every 50th, where rest is another recording's: that of the first rows."""
+    """Touched frames (n,) bool, every 100th, where rest is another recording's: that of the first rows."""
     counts = recording.electrodes[:rest]
     known = Rest(tuple(np.median(counts, axis=0)), tuple(np.ptp(counts, axis=0) / 2))
     later = recording.at(np.arange(rest, len(recording)))
-    touch = translate(later, prepare=PrepareOptions(rest=known), frames=slice(0, None, 50))
+    touch = translate(later, prepare=PrepareOptions(rest=known), frames=slice(0, None, 100))
     return np.linalg.norm(touch.force, axis=1) > 0
 
 
