@@ -96,11 +96,11 @@ def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitR
     """Find rest and film of a BioTac SP's unit in recordings that have no PDC and all begin in contact.
 
     Counts fall under load, so rest is first each electrode's median over the tenth of all frames in which it reads
-    highest. The skin bulges there, so this is too high, by up to 250 counts: rest and film are then changed to those
-    with which simulated contacts explain most of the changes. Tested on halves of 35 recordings and of six sets of
-    grasps: the translation then explains a third to two thirds of the other half, and a tenth at most without
-    (docs/units.md). ``spread`` is half the range of that tenth without its ends. Raises TactileError for fewer than
-    three recordings or snapshots, and for recordings that are not raw."""
+    highest. The skin bulges there, so this is too high (in 35 slips by 57 to 258 counts): rest and film are then
+    moved to those with which simulated contacts explain most of the changes. Tested on halves of 35 recordings and of
+    six sets of grasps: the translation then explains a third to two thirds of the other half, and a tenth at most
+    without (docs/units.md). ``spread`` is half the range of that tenth without its ends. Raises TactileError for
+    fewer than three recordings or snapshots, and for recordings that are not raw."""
     contacts = sum(len(one) if np.isnan(one.time).all() else 1 for one in recordings)
     if contacts < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"

@@ -22,8 +22,6 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.translation.networks import WEIGHTS_FOLDER
 
-pytestmark = pytest.mark.usefixtures("no_sheet")
-
 RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 needs_scipy = pytest.mark.skipif(importlib.util.find_spec("scipy") is None, reason="needs scipy, of the extra [fem]")
 
@@ -79,7 +77,7 @@ def test_frames_without_contact_or_solution_keep_their_gel(pressed):
 
 
 @needs_scipy
-def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path):
+def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path, no_sheet):
     path, found = str(request.config.rootpath / RECORDING), {}
     asked = {"few": ["--frames", "60:240:60"], "fewer": ["--frames", "120:121"]}
     for name, words in (asked | {"large": [*asked["fewer"], "--gel", "ball:100"]}).items():
@@ -160,7 +158,7 @@ def test_every_verb_that_translates_takes_any_gel(short, tmp_path, capsys):
     assert "no networks lead to the Coarse Mini" in capsys.readouterr().err
 
 
-def test_weights_that_lead_elsewhere_are_refused_unless_the_gel_is_solved(short, tmp_path, capsys):
+def test_weights_that_lead_elsewhere_are_refused_unless_the_gel_is_solved(short, tmp_path, capsys, no_sheet):
     words = ["convert", short, "--to", MINI, "--weights", str(WEIGHTS_FOLDER), "--keep", "", "--frames", "30:31"]
     assert main([*words, "--out", str(tmp_path / "a")]) == 2
     assert "networks that translate to coarse_mini. Train some (docs/extend.md), or" in capsys.readouterr().err

@@ -15,8 +15,6 @@ from tactile_core.translation.card import chain_error, doubt
 from tactile_core.translation.translate import load_translator
 from tactile_core.translation.trust_words import LOW_CONFIDENCE
 
-pytestmark = pytest.mark.usefixtures("no_sheet")
-
 NAME, MOST = "biotac_sp", 8e6  # bytes
 
 

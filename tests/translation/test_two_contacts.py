@@ -21,8 +21,6 @@ from tactile_core.translation.translate import load_translator
 from tactile_core.translation.translator import Translator
 from tactile_core.translation.weights import card_bytes, read_card
 
-pytestmark = pytest.mark.usefixtures("no_sheet")
-
 DOUBLE = "scenes/training/double_contacts.npz"
 
 
