@@ -15,6 +15,7 @@ from . import axes, digit_materials, held_light, sensor_bodies
 
 _INSIDE = 9e-3  # m below the gel's lowest point, under its window: there the camera's view in Cycles begins
 _LINKS = "receiver_collection", "blocker_collection"
+_LIT, _THROUGH = "DIGIT lit by its LEDs", "DIGIT shone through by its LEDs"  # collections of such names are of `_LINKS`
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 
 
@@ -60,9 +61,10 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
         name = f"{sensors.title(unit.camera.sensor)} camera"
         lens = _child(gel, name, bpy.data.cameras.new(name), "NONE")
         place_camera(lens, gel, unit.camera)
-    lamps = held_light.driven_by(coating_of(gel))
-    copied = bool(lamps) and lamps.isdisjoint(leds_of(gel).values())
-    if (first or copied) and coating_of(gel).users > 1:  # of a copied gel: its light is that of its own LEDs
+    lamps, leds = held_light.driven_by(coating_of(gel)), leds_of(gel).values()
+    copied = bool(lamps and leds) and lamps.isdisjoint(leds)
+    shared = coating_of(gel).users > 1 or gel.data.users > 1
+    if (first or copied) and shared:  # of a copied gel: its light is that of its own LEDs
         slot = next(slot for slot in gel.material_slots if slot.material == coating_of(gel))
         slot.link, slot.material = "OBJECT", slot.material.copy()
     if first or copied or held_light.NODE not in coating_of(gel).node_tree.nodes:
@@ -95,10 +97,10 @@ def _link_light(gel: bpy.types.Object) -> None:
     new = [led for led in leds if _lights_another(led, gel)]
     if new:
         known = next((led.light_linking.receiver_collection for led in leds if led not in new), None)
-        lit = known or bpy.data.collections.new("DIGIT lit by its LEDs")
+        lit = known or bpy.data.collections.new(_LIT)
         if gel.name not in lit.objects:
             lit.objects.link(gel)
-        through = bpy.data.collections.new("DIGIT shone through by its LEDs")
+        through = bpy.data.collections.new(_THROUGH)
         for part in parts_of(gel):
             if part.tactile.role == "BODY":
                 through.objects.link(part)
@@ -149,9 +151,10 @@ def watts_per_brightness(per_metre: float) -> float:
 def _keep_links_out_of_scenes(context: bpy.types.BlendImportContext) -> None:
     """Put what an appended or pasted LED lights beside it: Blender shows the collections that link light instead."""
     things = {item.id for item in context.import_items if item.id_type == "OBJECT" and item.id is not None}
-    for led in [thing for thing in things if thing.tactile.role == "LED" and thing.library is None]:
+    leds = [thing for thing in things if thing.tactile.role == "LED" and thing.library is None]
+    for led in (thing for thing in leds if thing.users_collection):
         for group in filter(None, (getattr(led.light_linking, name) for name in _LINKS)):
-            if not all(thing.tactile.role in ("DIGIT", "BODY") for thing in group.objects):
+            if not group.name.startswith((_LIT, _THROUGH)):
                 continue  # the user's own
             for parent in (*bpy.data.collections, *(scene.collection for scene in bpy.data.scenes)):
                 if group in parent.children.values():

@@ -166,7 +166,8 @@ def _composited(scene: bpy.types.Scene) -> bool:
     ends = [node.inputs[0] for node in tree.nodes if node.type in ("COMPOSITE", "GROUP_OUTPUT") and node.inputs]
     for end in ends:
         for link in end.links:
-            ends += [link.from_node.inputs[0]] if link.from_node.type == "REROUTE" else []
+            if link.from_node.type == "REROUTE" and link.from_node.inputs[0] not in ends:  # they may form a circle
+                ends.append(link.from_node.inputs[0])
             if link.from_node.type == "R_LAYERS" and link.from_socket.name == "Image":
                 return False
     return True

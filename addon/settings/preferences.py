@@ -69,10 +69,12 @@ def _tell(preferences: bpy.types.AddonPreferences) -> None:
 
 
 def sensors_in(folder: str) -> list[str]:
-    """List the sensors whose folders a folder of the user's holds, with a descriptor or with tables of a known one."""
+    """List the known sensors that have a folder of their name in a folder of the user's; none if it cannot be read."""
     known, place = descriptor.names(), Path(bpy.path.abspath(folder))
-    held = sorted(place.iterdir()) if place.is_dir() else []
-    return [each.name for each in held if each.is_dir() and each.name in known]
+    try:
+        return sorted(each.name for each in place.iterdir() if each.is_dir() and each.name in known)
+    except OSError:
+        return []
 
 
 class TactilePreferences(bpy.types.AddonPreferences):

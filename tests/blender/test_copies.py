@@ -35,13 +35,13 @@ def draw(part):
     return run
 
 
-def duplicate(gel, *parts):
+def duplicate(gel, *parts, linked=False):
     bpy.ops.object.select_all(action="DESELECT")
     for thing in (gel, *parts):
         thing.hide_select = False
         thing.select_set(True)
     bpy.context.view_layer.objects.active = gel
-    bpy.ops.object.duplicate()
+    bpy.ops.object.duplicate(linked=linked)
     bpy.context.object.location.x += 60
     return bpy.context.object
 
@@ -60,6 +60,14 @@ def test_a_copy_with_its_parts_has_lights_of_its_own(gel, draw, part):
         assert leds == driven_by(body.coating_of(thing)) & set(bpy.data.objects)
         assert all(led.light_linking.receiver_collection.objects.values() == [thing] for led in leds)
         assert all(each in thing.children for led in leds for each in led.light_linking.blocker_collection.objects)
+
+
+def test_a_copy_of_the_same_mesh_leaves_the_gel_its_light(gel, part):
+    copy = duplicate(gel, *gel.children_recursive, linked=True)
+    bpy.ops.tactile.set_up_render()
+    body, driven_by = part("addon.objects.digit_body"), part("addon.objects.held_light").driven_by
+    for thing in (gel, copy):
+        assert set(body.leds_of(thing).values()) == driven_by(body.coating_of(thing)) & set(bpy.data.objects)
 
 
 def test_a_copied_pair_is_translated_by_itself(imported):
@@ -144,6 +152,21 @@ def test_a_pasted_pair_is_translated_again_by_its_own_recording(imported, tmp_pa
     bpy.ops.tactile.translate()
     assert [thing.name for thing in scene.objects if thing.tactile.role == "DIGIT"] == ["DIGIT gel"]
     assert not scene.collection.children
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="Blender tells of what is appended from 4.3 on")
+def test_appended_leds_leave_the_user_s_own_collection_in_its_place(gel, tmp_path):
+    """The collections by which the extension links light are put beside the gel; this one is in the scene."""
+    home, red = gel.users_scene[0].collection.children[0], bpy.data.objects["LED red"]
+    mine = red.light_linking.receiver_collection = bpy.data.collections.new("Mine")
+    mine.objects.link(gel)
+    home.children.link(mine)
+    name = home.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.append(directory=f"{tmp_path / 'a.blend'}/Collection/", filename=name)
+    groups = {group.name: group for group in bpy.context.scene.collection.children_recursive}
+    assert "Mine" in groups and not [each for each in groups if each.startswith("DIGIT ")]
 
 
 def test_a_library_override_is_lit_when_it_is_opened_again(gel, draw, tmp_path):

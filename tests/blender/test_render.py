@@ -235,6 +235,8 @@ def test_a_compositor_that_changes_the_picture_is_said(ready, part):
     assert "compositor" in left_out(ready, gel)[0]
     tree.links.new(between.outputs[0], end.inputs[0])
     assert left_out(ready, gel) == []
+    tree.links.new(between.outputs[0], between.inputs[0])  # a circle, in place of what is rendered
+    assert "compositor" in left_out(ready, gel)[0]
     ready.render.use_compositing = False
     tree.links.clear()
     assert left_out(ready, gel) == []
