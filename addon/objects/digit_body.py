@@ -15,7 +15,8 @@ from . import axes, digit_materials, held_light, sensor_bodies
 
 _INSIDE = 9e-3  # m below the gel's lowest point, under its window: there the camera's view in Cycles begins
 _LINKS = "receiver_collection", "blocker_collection"
-_LIT, _THROUGH = "DIGIT lit by its LEDs", "DIGIT shone through by its LEDs"  # collections of such names are of `_LINKS`
+# Names of the collections that the extension makes to link light.
+_LIT, _THROUGH = "DIGIT lit by its LEDs", "DIGIT shone through by its LEDs"
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 
 

@@ -136,9 +136,8 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         found.append(f"{camera.name}: depth of field is left out")
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
-    found += ["The compositor's nodes change the picture: join Render Layers' Image to their output"] * _composited(
-        scene
-    )
+    words = "The compositor's nodes change the picture: join Render Layers' Image to their output"
+    found += [words] * _composited(scene)
     output = output_of(scene)
     view, device = output.view_settings, output.display_settings.display_device
     if scene.render.image_settings.file_format.startswith(LINEAR):

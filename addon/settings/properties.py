@@ -274,7 +274,7 @@ def check_own(*things: bpy.types.ID | None) -> None:
         if thing is not None and thing.library is not None:
             raise TactileError(
                 thing.name, f"linked from {thing.library.name}", "one of this file, which can be changed",
-                "Append it in place of linking; a library override can be moved and styled, its lights not dimmed",
+                "Append it in place of linking: a library override can be moved and styled; its lights cannot change",
             )  # fmt: skip
 
 

@@ -46,6 +46,14 @@ def duplicate(gel, *parts, linked=False):
     return bpy.context.object
 
 
+def save_beside_a_recording(tmp_path):
+    """Save one/a.blend; one/ and two/ each hold a touch.h5."""
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "touch.h5").write_bytes(RECORDING.read_bytes())
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one" / "a.blend"))
+
+
 def test_a_copy_with_its_parts_has_lights_of_its_own(gel, draw, part):
     before = draw(gel)
     copy = duplicate(gel, *gel.children_recursive)
@@ -116,10 +124,7 @@ def test_a_gel_appended_alone_says_what_is_missing(gel, draw, tmp_path, capfd):
 @pytest.mark.skipif(bpy.app.version < (4, 3), reason="Blender tells of what is appended from 4.3 on")
 def test_an_appended_recording_is_that_of_its_own_blend(imported, tmp_path):
     """Both .blends have a touch.h5 beside them."""
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "touch.h5").write_bytes(RECORDING.read_bytes())
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one" / "a.blend"))
+    save_beside_a_recording(tmp_path)
     skin = imported(filepath=str(tmp_path / "one" / "touch.h5"), frames="70:90")
     assert skin.tactile.recording == "//touch.h5"
     bpy.ops.wm.save_mainfile()
@@ -133,10 +138,7 @@ def test_an_appended_recording_is_that_of_its_own_blend(imported, tmp_path):
 @pytest.mark.skipif(bpy.app.version < (4, 3), reason="Blender tells of what is pasted from 4.3 on")
 def test_a_pasted_pair_is_translated_again_by_its_own_recording(imported, tmp_path):
     """The folder that it is pasted to has another touch.h5."""
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "touch.h5").write_bytes(RECORDING.read_bytes())
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one" / "a.blend"))
+    save_beside_a_recording(tmp_path)
     imported(filepath=str(tmp_path / "one" / "touch.h5"), frames="70:90")
     bpy.ops.tactile.translate()
     bpy.ops.object.select_all(action="DESELECT")
