@@ -201,7 +201,7 @@ def pictures(
 def note_of(
     path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
-    """Return the content of a result's note.json: what the same input reproduces.
+    """Return the content of a result's note.json: the input, settings and versions that made it; no time or folder.
     path, kind : the input, and what it is in words; count : number of rendered frames; preset : its name"""
     file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
     unit, calibration = renderer.calibration.unit, Path(options.calibration or calibration_path(renderer.camera.sensor))

@@ -38,10 +38,10 @@ class Batch:
 
 
 class Contacts:
-    """Contacts with their split and both surfaces. Row SILENT is no contact; row C + i mirrors contact i of the C.
-    frames : moving frames by "biotac" (source) and "digit" (target); generator : random numbers that start the bases
-    biotac, digit : `SurfaceCodec` of these; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
-    rest : (e,) counts from which changes are counted
+    """C training pairs and their split, with both surfaces' codes. Row i < C is contact i, row C + i its mirror image,
+    row SILENT no contact. frames : `ContactFrame` of "biotac" (the source) and of "digit" (the target)
+    biotac, digit : their `SurfaceCodec`; generator : of the random numbers with which the codecs' bases start
+    electrodes : how many a signal has; rest : (e,) counts, of the sensor at rest; depth : (C,) m, of the gel's dent
     device : that batches go to; the contacts themselves stay in the host's memory"""
 
     def __init__(
@@ -62,7 +62,7 @@ class Contacts:
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:
-        """Append SILENT to contact indices rows (B,), by the share ``options.silence`` of them, at least once."""
+        """Return rows (B,) with SILENT appended, ``options.silence`` times their number and at least once."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
@@ -73,15 +73,15 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate readings (B, 20) of rows (B,), counts and 1 if rectified; rectified, unit : as in `measured`"""
+        """Simulate the readings (B, e + 1) of rows (B,): e changes in counts and, last, 1 if they are rectified.
+        rectified, unit : as in `measured`"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]
         return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """Return the contacts of rows (B,), with SILENT for none and C + i for the mirror image of i, as a `Batch`.
-        signal : (B, 20) of `read`: changes in counts and, last, 1 if they are rectified"""
+        """Return the `Batch` of rows (B,), as in the class; signal : (B, e + 1) their readings by `read`"""
         at, turned = self._which(rows)
         force = self.pairs.force[at]
         force[turned] = across(force[turned])

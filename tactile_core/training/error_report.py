@@ -104,7 +104,7 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
 
 
 def silence_rows(measure: Measure) -> list[Row]:
-    """Return report rows of the means of `silence`, um and N; their baseline is 0."""
+    """Return report rows of mean motion, um, and force, N, in frames without contact; the baseline is 0."""
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]

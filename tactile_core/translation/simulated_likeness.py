@@ -54,7 +54,7 @@ FIRST = 64  # patterns most like the signal, of which one must be among the two:
 
 @dataclass(frozen=True)
 class Patterns:
-    """Simulated contacts, P of them, of e electrodes.
+    """Signals of P simulated contacts on e electrodes, to compare others with.
     signals : (P, e) float64 counts; units : (P, e), signals scaled to length one; alike : (P, P), cosines between them
     drift : (e,), of length one, the change when the fluid's conductivity changes"""
 
@@ -65,7 +65,7 @@ class Patterns:
 
 
 def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
-    """Return the `Patterns` of simulated contacts with signals (P, e) counts, of a unit with rest (e,) counts."""
+    """Return the `Patterns` of simulated contacts, from their signals (P, e) and the unit's rest (e,), counts."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
     drift = divider.of_films(DRIFT, rest) - rest
     return Patterns(signals, units, units @ units.T, drift / np.linalg.norm(drift))

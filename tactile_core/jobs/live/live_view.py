@@ -168,7 +168,7 @@ def _source(signals: Signals) -> str:
 @dataclass(frozen=True, eq=False)
 class Shown:
     """A picture on display.
-    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : a text on both
+    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : what these two say
     picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
     latency : s from the rows' arrival to the picture; work : s of CPU time in that"""
 

@@ -24,21 +24,21 @@ class UnsolvedError(ArithmeticError):
 
 
 class ExhaustedError(UnsolvedError):
-    """Error of a contact for which nothing is left of the ``Work`` that it may cost."""
+    """Error of a contact whose budget, ``Work``, is used up."""
 
 
 @dataclasses.dataclass
 class Work:
-    """Effort that contacts may still cost, ``left``: an iteration of a solver costs the cube of its unknowns."""
+    """Budget of computing for contacts; ``left`` : what remains. A solver's iteration costs its unknowns cubed."""
 
     left: float = np.inf
 
     def spend(self, unknowns: int, iterations: int) -> None:
-        """Subtract from ``left`` what a solver has used: the cube of its unknowns for each of its iterations."""
+        """Subtract from ``left`` what a solver has used: for each iteration, the cube of the number of unknowns."""
         self.left -= float(unknowns) ** 3 * iterations
 
     def check(self) -> None:
-        """Raise ExhaustedError if nothing is left."""
+        """Raise ExhaustedError if the budget is used up."""
         if self.left <= 0:
             raise ExhaustedError("too large a contact for the work it may cost")
 

@@ -184,8 +184,8 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
 
 
 def compact_file(sensor: str) -> pathlib.Path:
-    """Return the file of a sensor's condensed halves, if they ship; made by
-    `scripts/benchmarks/make/make_compliance.py`."""
+    """Return the path at which a sensor's condensed compliance ships, if it does: its parts even and odd in z, as
+    `scripts/benchmarks/make/make_compliance.py` writes them."""
     return shipped(f"compliance/{sensor}.h5")
 
 

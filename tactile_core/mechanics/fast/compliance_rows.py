@@ -52,11 +52,12 @@ class ComplianceRows:
         return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
 
     def sensing_motion(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of nodes (k,)."""
+        """Return the motion (3 k, c) m/N of the sensing points of indices ``inner`` (c,) under 1 N on each axis of
+        nodes (k,)."""
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return ``near``'s motion (n, 3) m by force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
+        """Return the displacements (n, 3) m of ``near``; arguments: see `Rows.moved`."""
         moved = self._under(nodes, force)
         if len(inner):
             moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]

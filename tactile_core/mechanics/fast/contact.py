@@ -24,8 +24,8 @@ from .frictionless import Frictionless, Try
 
 PENETRATION = 1e-6  # m, the target at any node
 _REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
-_SPARE = 0.15e-3  # m, by which more nodes are followed than that, so that a deeper contact needs no others (assumed)
-_LARGE = 2.5  # times the nodes wanted: following more costs more than a fresh start (assumed)
+_SPARE = 0.15e-3  # m, added to that for the nodes near, so that a deeper contact needs no others (assumed)
+_LARGE = 2.5  # times the nodes wanted: checking more costs more than a fresh start (assumed)
 _TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this close to it are taken in with them
 _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
@@ -46,9 +46,9 @@ class _Around(NamedTuple):
 class ContactProblem:
     """An indenter in front of one sensor; solves contacts at depths, at forces along the motion, and at other poses.
 
-    pose : of the indenter at depth 0; reach : m, depth up to which nodes that it may touch are followed from the start
+    pose : of the indenter at depth 0; reach : m, depth up to which all nodes that it may touch are near from the start
     friction : Coulomb's coefficient; with it a contact depends on the one it starts from, and on the steps between
-    work : effort that contacts may cost, None for no limit; a solve raises ExhaustedError once nothing is left"""
+    work : budget of computing, None for no limit; a solve raises ExhaustedError once it is used up"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0,
@@ -105,12 +105,12 @@ class ContactProblem:
 
     @property
     def near(self) -> np.ndarray:
-        """Sorted positions (n,) in ``compliance.touchable`` of the nodes that are followed."""
+        """Sorted positions (n,) in ``compliance.touchable`` of nodes near the indenter: each solve checks them."""
         return self._rows.near
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Followed nodes (n,), by position in ``touchable``: ``near`` without an ``EdgeContactProblem``'s points."""
+        """Nodes (n,), by position in ``touchable``: ``near`` without the points between nodes of a subclass."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:

@@ -51,7 +51,7 @@ class _Sprung(Frictionless):
 
 class EdgeContactProblem(ContactProblem):
     """Contact problem without friction on the m touchable nodes and, numbered from m on, points between them.
-    pose : at depth 0; reach : m, depth up to which nodes are followed; work : effort that it may cost, or None"""
+    pose : at depth 0; reach : m, depth up to which nodes are checked; work : budget of computing, or None"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, work: Work | None = None
@@ -67,7 +67,7 @@ class EdgeContactProblem(ContactProblem):
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Sorted positions (n,) in ``touchable`` of the followed nodes, without the points between them."""
+        """Sorted positions (n,) in ``touchable`` of the checked nodes, without the points between them."""
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:

@@ -274,8 +274,8 @@ def _stiffness(mode: np.ndarray) -> np.ndarray:
 @Loop
 def _tangent_response(matrix, k, nodes, tangent, normal, touching, core):  # noqa: ANN001, ANN202
     """Return the motion (q, q) along weighted tangents, ``tangent`` (q, 3), at ``nodes`` (q,) under unit forces along
-    them; and the change (q, t + d) of the gaps of the touching nodes (t,), along ``normal`` (k, 3), and of the points
-    ``core`` (d,) that press on the core. matrix, k : of the block"""
+    them; and the change (q, t + d) of the gaps of the touching nodes (t,), along ``normal`` (k, 3), and of the block's
+    inner points ``core`` (d,) that press on the core. matrix, k : the ``ComplianceBlock``'s"""
     q, t, d = len(nodes), len(touching), len(core)
     among, onto_gaps = np.empty((q, q)), np.empty((q, t + d))
     for each in range(q):

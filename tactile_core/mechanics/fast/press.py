@@ -50,7 +50,7 @@ class CorrectedPress:
     """An indenter in front of one sensor; solves contacts at depths or at corrected forces, each from the one before.
 
     pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
-    work : effort that contacts may cost, None for no limit; once nothing is left, ``at_depth`` raises ExhaustedError
+    work : budget of computing, None for no limit; once it is used up, ``at_depth`` raises ExhaustedError
         and ``at_force`` returns None
     """
 
@@ -62,7 +62,7 @@ class CorrectedPress:
         self.compliance, self.pose, self.limit = compliance, pose, limit
         self.problem = ContactProblem(compliance, indenter, pose, limit, friction, work)
         self.last: Contact | None = None
-        self._on_the_way: tuple[Contact, float] | None = None  # last contact of a search, and ``fall`` there
+        self._on_the_way: tuple[Contact, float] | None = None  # last contact of a search, and ``drop`` there
         self._last_power = 1.0
 
     @in_one_thread
@@ -72,17 +72,17 @@ class CorrectedPress:
         touches : true if ``pose`` is known to be at first touch; if false, first touch is found from it
         Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does."""
         there = pose or self.pose
-        fall = self._surface_drop(there, touches=touches)
-        return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
+        drop = self._surface_drop(there, touches=touches)
+        return self._guarded_if_needed(lambda: self._at_depth(depth, there, drop))
 
     @in_one_thread
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
         """Solve the contact whose corrected force along the motion is force N, to a thousandth; None if that lies
         beyond the limit, or is not found. pose : None for the press's own; touches : as in ``at_depth``"""
         there = pose or self.pose
-        fall, self._on_the_way = self._surface_drop(there, touches=touches), None
+        drop, self._on_the_way = self._surface_drop(there, touches=touches), None
         try:
-            return self._guarded_if_needed(lambda: self._at_force(force, there, fall))
+            return self._guarded_if_needed(lambda: self._at_force(force, there, drop))
         except UnsolvedError:
             return None
 
@@ -94,8 +94,8 @@ class CorrectedPress:
         """
         if self._on_the_way is None:
             return None
-        self.last, fall = self._on_the_way
-        return self._with_correction(self.last, fall)
+        self.last, drop = self._on_the_way
+        return self._with_correction(self.last, drop)
 
     def _guarded_if_needed(self, solve: Callable[[], _Found]) -> _Found:
         """Call ``solve``; if the indenter sinks in between frictionless nodes, call it again with points between them.
@@ -123,19 +123,19 @@ class CorrectedPress:
         rest = self.compliance.surface.rest[self.compliance.touchable[self.problem.nodes_near]]
         return sharpest(self.problem.indenter, self.pose, rest) >= BENDS
 
-    def _at_depth(self, depth: float, pose: Pose, fall: float) -> FastContact:
+    def _at_depth(self, depth: float, pose: Pose, drop: float) -> FastContact:
         contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
             self.last = contact
-        return self._with_correction(contact, fall)
+        return self._with_correction(contact, drop)
 
-    def _at_force(self, force: float, pose: Pose, fall: float) -> FastContact | None:
+    def _at_force(self, force: float, pose: Pose, drop: float) -> FastContact | None:
         """Find the contact at a corrected force N by secants in the logs of linear and corrected force, nearly a line.
 
-        fall : m, how much deeper first touch is than at the press's own pose
+        drop : m, how much deeper first touch is than at the press's own pose
         None beyond the limit; raises UnsolvedError if none is found."""
         if isinstance(self.problem, EdgeContactProblem):
-            return self._by_depths(force, pose, fall)
+            return self._by_depths(force, pose, drop)
         contact = self.last or self._find_first_contact(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
@@ -143,7 +143,7 @@ class CorrectedPress:
         for _ in range(_SEARCH_STEPS):
             if contact is None or not contact.converged:
                 raise UnsolvedError(f"no contact at {force:g} N")
-            linear, seen = contact.axial_force, _from_touch(contact, fall)
+            linear, seen = contact.axial_force, _from_touch(contact, drop)
             found = linear, linear * force_factor(self.compliance, seen)
             close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
             if seen.depth > self.limit and (close or found[1] < force):
@@ -152,27 +152,27 @@ class CorrectedPress:
                 return None
             if close:
                 self.last = contact
-                return self._with_correction(contact, fall)
+                return self._with_correction(contact, drop)
             if seen.depth <= self.limit:
-                self._on_the_way = contact, fall
+                self._on_the_way = contact, drop
             growth = (force / max(found[1], 1e-12)) ** (1 / self._power(before, found))
             before, goal = found, linear * float(np.clip(growth, 1 / _GROWTH, _GROWTH))
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
-    def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Find the contact at a force N by a search over depth, faster with points between nodes; fall, result and
+    def _by_depths(self, force: float, pose: Pose, drop: float) -> FastContact | None:
+        """Find the contact at a force N by a search over depth, faster with points between nodes; drop, result and
         errors are ``_at_force``'s."""
 
         def move(depth: float, before: FastContact) -> FastContact:
             """Return the corrected contact at a depth m from first touch, starting from the contact before."""
-            contact = self.problem.at_pose(pose.moved(depth + fall), before.linear)
+            contact = self.problem.at_pose(pose.moved(depth + drop), before.linear)
             if not contact.converged:
                 raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")
-            return self._with_correction(contact, fall)
+            return self._with_correction(contact, drop)
 
-        start = self.last or self.problem.at_pose(pose.moved(fall))
-        begin = self._with_correction(start, fall)
+        start = self.last or self.problem.at_pose(pose.moved(drop))
+        begin = self._with_correction(start, drop)
         try:
             found = touch_at_force(move, begin, pose.direction, force, self.limit, "")
         except PenetrationError:
@@ -207,17 +207,17 @@ class CorrectedPress:
             return float((pose.apex - self.pose.apex) @ pose.direction)
         return surface_drop(self.compliance.surface, self.problem.indenter, self.pose, pose)
 
-    def _with_correction(self, contact: Contact, fall: float) -> FastContact:
+    def _with_correction(self, contact: Contact, drop: float) -> FastContact:
         if contact.converged:
             self.problem.check_follows(contact)
-        made = correct(self.compliance, _from_touch(contact, fall))
+        made = correct(self.compliance, _from_touch(contact, drop))
         pressure = made.factor * contact.fluid_pressure
         force, axial = made.factor * contact.force, made.factor * contact.axial_force
-        return FastContact(contact, made, force, axial, pressure, contact.depth - fall)
+        return FastContact(contact, made, force, axial, pressure, contact.depth - drop)
 
 
-def _from_touch(contact: Contact, fall: float) -> Contact:
-    """Return a contact with its depth counted from first touch at the place slid to, ``fall`` m deeper than at the
+def _from_touch(contact: Contact, drop: float) -> Contact:
+    """Return a contact with its depth counted from first touch at the place slid to, ``drop`` m deeper than at the
     press's own, as the correction expects."""
-    depth = max(contact.depth - fall, _LEAST_DEPTH)
+    depth = max(contact.depth - drop, _LEAST_DEPTH)
     return contact if depth == contact.depth else contact.at_depth(depth)

@@ -218,7 +218,7 @@ class ContactSet:
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)
 
     def follow(self, reaction: np.ndarray) -> None:
-        """If any node slips, update friction to the normal forces of a reaction (k, 3) N in ``begin``'s frames."""
+        """Store the normal forces, and limit friction by them, if any node slips. reaction : as in ``press``"""
         if self.slips:
             self.pressing = reaction[:, 0].copy()
             before = self.rubbing
@@ -226,7 +226,7 @@ class ContactSet:
             self.imbalance = float(np.abs(self.rubbing - before).max() / max(self.pressing.max(initial=0), 1e-12))
 
     def press(self, reaction: np.ndarray) -> None:
-        """Store the normal forces of a reaction (k, 3) N, in ``begin``'s frames."""
+        """Store the normal forces. reaction : (k, 3) N, of the obstacle on touching nodes, in ``begin``'s frames"""
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:

@@ -18,7 +18,7 @@ class ContactState:
     """A solved contact.
     depth : m, from the problem's own pose; pose : of the indenter now; state : of the solid
     outer, inner : contact of the surface with the indenter, and of the inner skin with the core
-    push : of the indenter on the penalty points; guarded : true if these are in use
+    push : forces of the indenter on the penalty points between nodes; guarded : true if these points are in use
     fluid : Pa, rise of the fluid's pressure
     iterations : Newton iterations of the last load step; steps : load steps since the start, failed ones counted"""
 

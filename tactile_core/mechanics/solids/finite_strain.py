@@ -26,8 +26,7 @@ SHARE = 4.0
 class NeoHookean:
     """Nearly incompressible neo-Hookean law.
 
-    shear : mu, Pa; bulk : kappa, Pa, the part that the cells' pressures carry. Simo, Taylor, Pister, Comput. Methods
-        Appl. Mech. Eng. 51, 1985
+    shear : mu, Pa; bulk : kappa, Pa, the bulk modulus that acts through each cell's pressure
     at_points : Pa, a part of the bulk modulus that acts at each Gauss point, so that coarse cells do not buckle. If the
         cell's pressure alone held the volume, a Gauss point could lose half of its volume to the next one: under a
         sharp edge, or deep under a small ball, coarse cells then buckle. Fine meshes have the same limit
@@ -47,8 +46,8 @@ class NeoHookean:
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)) - at_points, at_points)
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Return the energy density (...,) J/m3, the cells' pressures' part left out, of deformation gradients f (...,
-        3, 3) with determinants j (...,)."""
+        """Return the energy density W(F) (...,) J/m3, without the pressure's terms p (J - 1) - p^2 / (2 kappa).
+        f, j : F (..., 3, 3) and its determinant J (...)"""
         isochoric = self.shear / 2 * (j ** (-2 / 3) * np.einsum("...ij,...ij->...", f, f) - 3)
         return isochoric + self.at_points / 2 * (j - 1) ** 2
 

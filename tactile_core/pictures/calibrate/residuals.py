@@ -74,7 +74,7 @@ def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibratio
     return changed.with_gain(calibration.gain).with_through(through)
 
 
-GAIN_STEPS = 2  # by Gauss and Newton's method, from the gain of the last cost
+GAIN_STEPS = 2  # by Gauss and Newton's method, from the gain that the call of ``cost`` before found
 GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels per unit of radiance, of C; levels per mm, of its slopes; assumed
 PRESS_STEP = 10e-3  # mm
 
@@ -114,7 +114,7 @@ class UnitResiduals:
         self.gain = self._start_gain
 
     def unit(self, x: np.ndarray) -> Calibration:
-        """Return the calibration that x (n,) describes, with the gain found at the last cost."""
+        """Return the calibration that x (n,) describes, with the gain that the last call of ``cost`` found."""
         numbers = self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
@@ -156,13 +156,13 @@ class UnitResiduals:
         return np.maximum(x, least)
 
     def unexplained(self) -> np.ndarray:
-        """Return the share (presses,) of each photograph's sum of squares that the last cost leaves as residual."""
+        """Return the share (presses,) of each photograph's sum of squares left as residual by the last ``cost``."""
         pairs = zip(self._missed(), self._sights, strict=True)
         return np.array([np.square(missed).sum() / np.square(sight.shown).sum() for (missed, _), sight in pairs])
 
     def gain_errors(self) -> tuple[float, float, float]:
-        """Return standard errors, rms over LEDs, of the gain and its slopes per mm to right and down, at the last
-        cost."""
+        """Return the standard errors of the gain and of its slopes per mm to right and down, each rms over the LEDs,
+        at the parameters of the last call of ``cost``."""
         inverse = np.linalg.inv(self._gain_equations()[0])  # (channel, 9, 9)
         squares = MODEL_ERROR**2 * inverse.diagonal(0, 1, 2).mean(0).reshape(3, 3).mean(1)
         return tuple(np.sqrt(squares).tolist())
