@@ -111,7 +111,7 @@ class TACTILE_OT_save_as_calibration(OnGel, TactileOperator, ExportHelper):
 
 
 class TACTILE_OT_set_up_render(OnGel, TactileOperator):
-    """Render what a gel's camera sees: engine, its size in pixels, colours as it gives them, a camera in the gel"""
+    """Set the scene up to render what a gel's camera sees: engine, camera, size in pixels, and unchanged colours"""
 
     bl_idname = "tactile.set_up_render"
     bl_label = "Set Up Render"

@@ -18,8 +18,8 @@ def budget_of(scene: bpy.types.Scene) -> Budget:
 
 
 def preset_of(scene: bpy.types.Scene) -> str:
-    """Return a scene's preset: the cheapest that keeps its largest error of pictures, or the chosen one if that is not
-    given. Raises TactileError if the error's text cannot be read, or if no preset keeps it."""
+    """Return a scene's preset: if the scene has a largest error of pictures, the cheapest preset within it, else the
+    chosen one. Raises TactileError if the error's text cannot be read, or if no preset is within it."""
     levels = budget_of(scene).levels
     if levels is None:
         return scene.tactile_render.preset

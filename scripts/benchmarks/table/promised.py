@@ -65,7 +65,7 @@ def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]]]:
 
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:
-    """Yield a ``Promise`` for the fast tier's shape and one for its force, of each sensor. quick : fewer contacts"""
+    """Yield bounds and errors of the fast tier's shape and of its force, for each sensor. quick : fewer contacts"""
     pairs, (scene, _) = test_contacts(quick), load_scene(TRAINING)
     for sensor in SENSORS:
         misses = list(fast_misses(sensor, pairs, scene))
@@ -85,7 +85,7 @@ def of_mechanics(quick: bool) -> Iterator[Promise]:
 
 
 def of_translation(quick: bool) -> Iterator[Promise]:
-    """Yield a ``Promise`` for the largest node error of translations, of each surface. quick : fewer contacts"""
+    """Yield bounds and errors of the largest node error of translations, for each surface. quick : fewer contacts"""
     pairs, translator = test_contacts(quick), load_translator()
     change, rows = as_read(pairs.signal, SEED), np.arange(len(pairs.press))
     columns = error_columns(translator.nets, pairs, rows, change, our_bodies(), translator.silent("digit_m"))

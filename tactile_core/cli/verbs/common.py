@@ -100,7 +100,7 @@ def check_seed(seed: int) -> None:
 
 
 def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the fields of ``recordings.PrepareOptions`` by name, from the options of a verb that prepares them."""
+    """Return the fields of ``recordings.PrepareOptions`` by name, from the options of a verb on recordings."""
     return {
         "kind": options.kind,
         "tare": None if options.tare == "auto" else options.tare,

@@ -47,9 +47,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--keep",
         metavar="WORDS",
-        help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: these three) and"
-        " traction_biotac,traction_digit, or traction for both: Pa on each surface node, by the fast tier alone;"
-        " displacement_NAME and traction_NAME of any other sensor, too",
+        help="what to store, joined by commas: electrodes; displacement_S, m, of a sensor S such as biotac or digit;"
+        " traction_S, Pa on each surface node (fast tier alone); traction, short for traction_biotac,traction_digit"
+        " (default: electrodes,displacement_biotac,displacement_digit)",
     )
     add(verb, "--error", bound="um of the surface, such as 50um")
     about = "begin at once, however long the tier that --error picks will take"

@@ -187,7 +187,8 @@ class GelLight:
         found = mirrored(
             mi, self._hit, self._scene, self._emitters, hit, self._turned, lobe, self._height, to_cell, shape
         )
-        return self._finer(evened((found * (step / cell) ** 2).astype(np.float32)), cell)
+        found *= (step / cell) ** 2  # a ray stands for a square of ``step`` px, not for a cell
+        return self._finer(evened(found.astype(np.float32)), cell)
 
     def _finer(self, coarse: np.ndarray, step: int) -> np.ndarray:
         """Interpolate the ``coarse`` light (h, w, 3), of squares of ``step`` px, to every pixel (H, W, 3)."""

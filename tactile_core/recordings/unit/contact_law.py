@@ -205,8 +205,8 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
 
 
 def as_contact(level: np.ndarray, sensor: str, readings: Sequence[np.ndarray] = ()) -> float | None:
-    """Return the share (0..1) that one contact explains of a level's difference to a typical unit's rest, of what the
-    best conductivity leaves of it; None if that is too little for a contact, and for sensors without simulated ones.
+    """Return the share (0..1) that one simulated contact explains of a level's difference to a typical rest with the
+    conductivity that fits best; None if that is too little for a contact, or if the sensor has no simulated ones.
 
     level : (e,) counts taken for rest; readings : (T, e) counts of each recording, by which faulty electrodes are left
     out: those that stand still in all, or are outside the range of rests (unless most are)"""
