@@ -52,10 +52,13 @@ def fingerprint(thing: bpy.types.Object) -> str:
 
 
 def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
-    """Raise TactileError for an object that cannot press: it is mirrored, or was made from a spec and later changed.
+    """Raise TactileError for an object that cannot press: it is edited or mirrored, or was made from a spec and later
+    changed.
 
     relative : (3, 3), the object's axes by ``world_axes``
     """
+    if thing.mode == "EDIT":  # its mesh is as it was before
+        raise TactileError(thing.name, "in Edit Mode", "Object Mode", "Press Tab over the 3D view")
     if np.linalg.det(relative) <= 0:
         advice = "Apply the scale (Ctrl A) and flip normals"
         raise TactileError(thing.name, "its scale is negative or zero", "a scale above 0", advice)

@@ -16,6 +16,7 @@ from ..settings import properties
 
 DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender."}
 DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
+_STRAIGHT = 1e-7  # m and N, off a straight line, taken for float32's rounding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,8 +108,7 @@ def authored(context: bpy.types.Context) -> Authored:
     specs = _specs([thing, *others], sensor, context, meshes)
     kept = document.pop("recording", None) or {}
     by_height = thing.tactile.press_by == "HEIGHT"
-    frames = _sampled(scene) if by_height else _key_frames(scene, thing, sensor)
-    values = motion_of(context, thing, sensor, frames)
+    frames, values = _path(context, thing, sensor, by_height)
     points = _points(scene, frames, values, kept.get("points", []))
     pressing = specs[0].name
     order = {name: k for k, name in enumerate(document.pop("order", []))}
@@ -155,22 +155,22 @@ def _spec(thing, sensor, context, meshes: dict[str, bytes]) -> Any:  # noqa: ANN
     return spec
 
 
-def _sampled(scene: bpy.types.Scene) -> np.ndarray:
-    return np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
-
-
-def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """Return the frames of an indenter's keys if its curves are straight lines between them, else every frame."""
-    animation = thing.animation_data
-    free = thing.parent in (None, sensor) and not thing.constraints
-    if not free or animation is None or animation.action is None or animation.nla_tracks:
-        return _sampled(scene)
-    moving = [c for c in curves.fcurves_of(thing) if c.data_path in ("location", "tactile.force")]
-    points = [point for curve in moving for point in curve.keyframe_points]
-    if animation.drivers or not points or any(point.interpolation != "LINEAR" for point in points):
-        return _sampled(scene)
-    inside = {float(point.co.x) for point in points if scene.frame_start <= point.co.x <= scene.frame_end}
-    return np.array(sorted(inside | {float(scene.frame_start), float(scene.frame_end)}))
+def _path(context, thing, sensor, whole: bool) -> tuple[np.ndarray, dict[str, np.ndarray]]:  # noqa: ANN001
+    """Return frames (P,) of the scene and the path of the indenter ``thing`` there, as ``motion_of`` does: at its keys
+    alone if it is straight between them, whatever moves it or the sensor. whole : true for every frame"""
+    scene = context.scene
+    frames = np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
+    values = motion_of(context, thing, sensor, frames)
+    moves = thing.animation_data
+    moving = curves.fcurves_of(thing) if moves is not None and moves.action is not None else ()
+    keyed = {float(point.co.x) for curve in moving for point in curve.keyframe_points}
+    if whole or not keyed:
+        return frames, values
+    keys = np.array(sorted({k for k in keyed if frames[0] < k < frames[-1]} | {frames[0], frames[-1]}))
+    at = motion_of(context, thing, sensor, keys)
+    rows, wanted = (np.column_stack([each["apex"], each["force"]]).T for each in (at, values))
+    between = [np.interp(frames, keys, row) for row in rows]
+    return (keys, at) if np.allclose(between, wanted, rtol=1e-5, atol=_STRAIGHT) else (frames, values)
 
 
 def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ...tactile_core.errors import TactileError
 from ...tactile_core.files import atomic
 from ...tactile_core.sensors import SAMPLE_RATE
 from ..objects import axes, curves, indenter_objects, mesh_cache, motion
@@ -146,6 +147,10 @@ class TACTILE_OT_simulate(JobOperator):
         properties.check_own(*pressed, *(each.data for each in pressed))
         scene_bridge.check_free(*pressed)
         motion.check_rest(*pressed)
+        render = context.scene.render
+        if render.frame_map_old != render.frame_map_new:  # else keys would lie on other frames than they are of
+            found = f"time is stretched, {render.frame_map_old} to {render.frame_map_new}"
+            raise TactileError(context.scene.name, found, "none", "Set Output > Time Stretching to 100 and 100")
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")

@@ -205,6 +205,7 @@ def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> 
     """Set a scene's frame rate and range to play a recording of ``rate`` Hz in real time from ``first`` to ``last``."""
     scene.render.fps = max(1, round(rate))
     scene.render.fps_base = scene.render.fps / rate
+    scene.render.frame_map_old = scene.render.frame_map_new = 100
     scene.frame_start, scene.frame_end = first, last
     scene.frame_set(first)
 

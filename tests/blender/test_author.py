@@ -105,6 +105,48 @@ def test_a_motion_of_the_user_s_own_is_exported(sensors, part, tmp_path):
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("by", ["gel", "noise", "delta"])
+def test_motion_that_keys_do_not_tell_is_sampled(sensors, part, tmp_path, by):
+    """The path between two straight keys was taken for a line, whatever else moved the indenter or the gel."""
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    ball, fcurves_of = bpy.context.object, part("addon.objects.curves").fcurves_of
+    sensors.frame_start, sensors.frame_end = 1, 11
+    ball.tactile.press_by, ball.parent = "FORCE", None
+    for frame, force in ((1, 0.0), (11, 0.4)):
+        _key(ball, frame, x=-8, force=force)
+    curves = [*fcurves_of(ball)]
+    moved = {"gel": sensors.objects["DIGIT gel"], "delta": ball}.get(by)
+    for frame, x in ((1, 0), (6, 4), (11, 0)) if moved else ():
+        path = "location" if by == "gel" else "delta_location"
+        setattr(moved, path, (x, *getattr(moved, path)[1:]))
+        moved.keyframe_insert(path, index=0, frame=frame)
+    for point in (point for curve in curves for point in curve.keyframe_points):
+        point.interpolation = "LINEAR"
+    if by == "noise":
+        curves[0].modifiers.new("NOISE").strength = 4
+    points = part("tactile_core.simulation.scene").load_scene(_export(tmp_path))[0].recording.points
+    x = [point.x_mm for point in points]
+    assert len(x) == 11 and x[5] == pytest.approx({"gel": -12, "delta": -4}.get(by, x[5]), abs=0.01)
+    assert np.ptp(x) > 0.5
+
+
+def test_time_that_is_stretched_is_refused(gel_alone):
+    """Keys baked at a frame are played at another then; an import sets it back."""
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    gel_alone.render.frame_map_new = 50
+    with pytest.raises(RuntimeError, match=r"time is stretched, 100 to 50; expected none"):
+        bpy.ops.tactile.simulate()
+
+
+def test_an_indenter_in_edit_mode_is_refused(gel_alone, tmp_path):
+    """It pressed as it was before it was edited."""
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    bpy.context.object.tactile.press_by = "FORCE"
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match=r"sphere: in Edit Mode; expected Object Mode. Press Tab"):
+        _export(tmp_path)
+
+
 def test_curved_motion_is_sampled(sensors, part, tmp_path):
     bpy.ops.tactile.add_indenter(shape="sphere")
     ball = bpy.context.object

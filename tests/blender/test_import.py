@@ -131,7 +131,9 @@ def test_a_mesh_cache_of_a_new_file_of_blender_s_is_in_its_units(imported, nodes
 
 
 def test_the_scene_plays_in_the_recording_s_time(imported, scene):
+    scene.render.frame_map_new = 50
     imported()
+    assert scene.render.frame_map_new == scene.render.frame_map_old
     assert (scene.frame_start, scene.frame_end) == (40, 139)
     assert scene.render.fps / scene.render.fps_base == pytest.approx(100, rel=1e-6)
     assert scene.unit_settings.scale_length == pytest.approx(1e-3)
