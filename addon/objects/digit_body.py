@@ -11,7 +11,7 @@ from ...tactile_core import sensors
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import Camera, Led
 from ..settings import properties
-from . import axes, digit_materials, held_light, sensor_bodies
+from . import axes, digit_materials, held_light, sensor_bodies, surfaces
 
 _INSIDE = 9e-3  # m below the gel's lowest point, under its window: there the camera's view in Cycles begins
 _LINKS = "receiver_collection", "blocker_collection"
@@ -51,8 +51,11 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
     """Add the missing parts of a unit's body to the gel; parts that exist stay as the user has changed them."""
     first = not has_body(gel)
     if coating_of(gel) is None:
+        materials = [slot.material for slot in gel.material_slots]
+        own = [each for each in materials if each and each.name != surfaces.OBJECT_COLOUR]
         gel.data.materials.clear()
-        gel.data.materials.append(digit_materials.new_coating(unit.coating))
+        for material in (digit_materials.new_coating(unit.coating), *own):  # the user's are kept, in slots of no face
+            gel.data.materials.append(material)
     if first:
         for led in unit.leds:
             if led.colour not in leds_of(gel):

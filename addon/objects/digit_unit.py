@@ -148,6 +148,7 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
         f"Look {view.look}": view.look != "None",
         "Exposure": view.exposure != 0, "Gamma": view.gamma != 1, "Curves": view.use_curve_mapping,
         "White balance": getattr(view, "use_white_balance", False),  # since Blender 4.3
+        "Color BW": scene.render.image_settings.color_mode == "BW",
         "Dither": scene.render.dither_intensity > 0, "Burn Into Image": scene.render.use_stamp,
         f"Display {device}": device != "sRGB" and view.view_transform != "Raw",
     }  # fmt: skip

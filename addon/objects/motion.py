@@ -13,13 +13,18 @@ _APPLIED = 1e-4  # m, median shift of nodes that shows a mesh moved as a whole: 
 
 
 def check_rest(*things: bpy.types.Object) -> None:
-    """Raise TactileError for a sensor in Edit Mode, which neither plays nor takes keys then, and for one whose mesh was
-    moved within the object, as Apply Location does: all places would be off."""
+    """Raise TactileError for a sensor that does not play: in Edit Mode, where it takes no keys either, with a shape key
+    pinned, or with relative ones; and for one whose mesh was moved within the object, as Apply Location does: all
+    places would be off."""
     for thing in things:
         if thing.mode == "EDIT":
             found = "in Edit Mode, where it is at rest"
             raise TactileError(thing.name, found, "Object Mode", "Press Tab over the 3D view")
         keys = thing.data.shape_keys
+        if keys and (thing.show_only_shape_key or keys.use_relative) and played(thing):
+            found = "one of its shape keys is pinned" if thing.show_only_shape_key else "its shape keys are relative"
+            advice = "Undo that in Properties > Data > Shape Keys"
+            raise TactileError(thing.name, f"{found}: it does not move", "keys that are played in turn", advice)
         own = np.empty(3 * len(thing.data.vertices), np.float32)
         (keys.reference_key.data if keys else thing.data.vertices).foreach_get("co", own)
         rest, nodes = properties.surface_of(thing).rest, axes.to_sensor(own.reshape(-1, 3), thing.tactile.per_metre)

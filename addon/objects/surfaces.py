@@ -7,6 +7,7 @@ import math
 import bpy
 import numpy as np
 
+OBJECT_COLOUR = "Tactile object colour"  # material of what has no other
 _SHARP = math.radians(30)  # between faces that meet in an edge
 
 
@@ -55,11 +56,10 @@ def new_material(name: str) -> tuple[bpy.types.Material, bpy.types.Node]:
 
 
 def _material() -> bpy.types.Material:
-    name = "Tactile object colour"
-    found = bpy.data.materials.get(name)
+    found = bpy.data.materials.get(OBJECT_COLOUR)
     if found is not None:
         return found
-    material, shader = new_material(name)
+    material, shader = new_material(OBJECT_COLOUR)
     nodes, links = material.node_tree.nodes, material.node_tree.links
     colour = nodes.new("ShaderNodeObjectInfo")
     colour.location = (-250, 200)

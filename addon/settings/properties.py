@@ -213,8 +213,10 @@ def found_again(scene: bpy.types.Scene, uid: int, was: str, what: str) -> bpy.ty
 
 def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
     """Return ``near`` or a gel in its collections, else that of the scene's camera, else the first, else None."""
-    seen = None if scene.camera is None else scene.camera.parent
-    seen = seen if seen is not None and seen.tactile.role == "DIGIT" and seen.name in scene.objects else None
+    seen = scene.camera
+    while seen is not None and seen.tactile.role != "DIGIT":  # an empty may stand between
+        seen = seen.parent
+    seen = seen if seen is not None and seen.name in scene.objects else None
     return _beside(scene, "DIGIT", near) or seen or of_role(scene, "DIGIT")
 
 

@@ -75,6 +75,26 @@ def test_two_gels_are_drawn_each_by_its_own_parts(translated, part):
     assert (before[1] == after[1]).all()  # a copy without LEDs has the calibration's
 
 
+def test_the_camera_s_gel_is_drawn_with_an_empty_between(translated, part):
+    bpy.ops.tactile.set_up_render()
+    copy, empty = translated.copy(), bpy.data.objects.new("empty", None)
+    for thing in (copy, empty):
+        bpy.context.scene.collection.objects.link(thing)
+    empty.parent, bpy.context.scene.camera.parent = copy, empty
+    assert part("addon.settings.properties").gel_of(bpy.context.scene) == copy
+
+
+def test_a_material_of_the_user_s_is_kept_beside_the_coating(translated):
+    """Set Up Render removed it, and the next save lost it."""
+    own = bpy.data.materials.new("velvet")
+    translated.data.materials.clear()
+    translated.data.materials.append(own)
+    bpy.ops.tactile.set_up_render()
+    first, second = (slot.material for slot in translated.material_slots)
+    assert first.name.startswith("DIGIT coating") and second == own
+    assert not any(face.material_index for face in translated.data.polygons)
+
+
 @pytest.mark.parametrize("scale", [(1, 1, -1), (-1, 1, 1), (0, 1, 1)])
 def test_a_mirrored_indenter_is_refused_in_words(scene, scale):
     pytest.importorskip("msgspec")

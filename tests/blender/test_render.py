@@ -202,7 +202,8 @@ def test_colours_of_the_output_alone_are_seen_and_set_back(ready, part, tmp_path
     assert left_out(ready, gel) == []
     assert np.abs(np.rint(255 * _pixels(tmp_path / "frame.png")) - wanted).max() <= 1
     image.view_settings.exposure, ready.view_settings.use_curve_mapping = 1.0, True
-    assert left_out(ready, gel) == ["Exposure changes the levels; Set Up Render sets Raw alone"]
+    image.color_mode = "BW"
+    assert left_out(ready, gel) == ["Exposure, Color BW change the levels; Set Up Render sets Raw alone"]
     bpy.ops.tactile.set_up_render()
     assert left_out(ready, gel) == [] and image.color_management == "FOLLOW_SCENE"
 
