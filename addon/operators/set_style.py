@@ -82,8 +82,7 @@ def follow(thing: bpy.types.Object, before: float) -> None:
     """Renew a sensor's displacement or contact patch style for a new animation: its legend, the error below which
     colours fade, and the colours' range unless the user had set that.
 
-    before : m, largest displacement of the animation that was replaced, 0 for none; any other range was the user's
-    """
+    before : m, largest displacement of the animation that was replaced, 0 for none; any other range was the user's"""
     style = styles.style_of(thing)
     if style not in ("DISPLACEMENT", "CONTACT_PATCH"):
         return

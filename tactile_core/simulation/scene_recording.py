@@ -97,24 +97,27 @@ def simulate_recording(
         frames.append(known[x, z, newtons])
         if progress:
             progress(len(frames), len(time))
-    fluid, electrode_counts, pdc, still = "", None, None, None
+    counts, pdc, still, note = None, None, None, ""
     if "electrodes" in keep:
-        pressure = _pressure(frames)
-        change = np.stack([frame.change for frame in frames])
-        drift = spec.drift_counts / (spec.points[-1].time_s - spec.points[0].time_s)
-        electrode_counts = readings(change, time, seed, noise=spec.noise_counts, drift=drift)
-        pdc = pdc_counts(pressure)
+        counts, pdc, note = _read(frames, time, spec, seed)
         still = np.full(len(time), _STILL_COUNT, np.int16)
-        fluid = f" Fluid pressure {pressure.min() / 1e3:.2f} to {pressure.max() / 1e3:.2f} kPa; PDC counts "
-        fluid += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the sheet law."
     made_by = ", ".join(["mechanics.recording", *map(" ".join, sorted((tiers or {}).items()))])
     write_simulated(
-        out, time=time, electrodes=electrode_counts, pdc=pdc, tac=still, tdc=still,
+        out, time=time, electrodes=counts, pdc=pdc, tac=still, tdc=still,
         truth=_truth(frames, keep), scene=text, seed=seed,
         made_by=f"tactile {__version__}, {made_by}",
-        note=f"Simulated, not measured: {scene.description}{fluid}",
+        note=f"Simulated, not measured: {scene.description}{note}",
     )  # fmt: skip
     return int((force > 0).sum())
+
+
+def _read(frames: list[_Frame], time: np.ndarray, spec: RecordingSpec, seed: int) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the electrodes (T, e) and PDC (T,), counts, at the frames' ``time`` (T,) s, and a note on the pressure."""
+    pressure, change = _pressure(frames), np.stack([frame.change for frame in frames])
+    drift = spec.drift_counts / (spec.points[-1].time_s - spec.points[0].time_s)
+    note = f" Fluid pressure {pressure.min() / 1e3:.2f} to {pressure.max() / 1e3:.2f} kPa; PDC counts "
+    note += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the sheet law."
+    return readings(change, time, seed, noise=spec.noise_counts, drift=drift), pdc_counts(pressure), note
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:

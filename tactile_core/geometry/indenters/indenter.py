@@ -201,11 +201,10 @@ class Size:
 
 @dataclasses.dataclass(frozen=True)
 class SceneForm:
-    """Entry of a shape in scenes and in Blender's Add menu; every module here with a ``SCENE`` of this type has one.
+    """Entry of a shape in scenes and in Blender's Add menu, made of the ``SCENE`` of this type in each module here.
     kind : its name in scenes; shape : class or function that makes it; says : what it is, in one line
     sizes : the ``Size`` of each argument of ``shape``, those without a default first
-    label, icon : in the menu, "" for none
-    """
+    label, icon : in the menu, "" for none"""
 
     kind: str
     shape: Callable[..., Indenter]
@@ -215,8 +214,7 @@ class SceneForm:
     icon: str = ""
 
     def build(self, values: Mapping[str, Any]) -> Indenter:
-        """Build the shape from values in mm or degrees, by ``Size.field``. Raises TactileError for an impossible
-        body."""
+        """Build the shape from values in mm or degrees, by ``Size.field``. Raises TactileError if none has these."""
         return self.shape(**{argument: size.in_si(values[size.field]) for argument, size in self.sizes.items()})
 
 

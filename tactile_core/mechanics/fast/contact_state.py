@@ -29,8 +29,7 @@ class Contact:
     converged : false if the solve ended early: do not use it; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
     penetration : m, the largest depth of a node in the indenter or of the inner skin in the core
-    sideways : norm of nodal forces' parts across the indenter's normals, over the whole force; 0 without friction
-    """
+    sideways : norm of nodal forces' parts across the indenter's normals, over the whole force; 0 without friction"""
 
     compliance: Compliance = dataclasses.field(repr=False)
     pose: Pose

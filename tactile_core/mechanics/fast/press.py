@@ -51,8 +51,7 @@ class CorrectedPress:
 
     pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
     work : budget of computing, None for no limit; once it is used up, ``at_depth`` raises ExhaustedError
-        and ``at_force`` returns None
-    """
+        and ``at_force`` returns None"""
 
     @in_one_thread
     def __init__(

@@ -66,8 +66,7 @@ def _spline(sensor: str):  # noqa: ANN202 (scipy is imported only where it is ne
 def facing_core(sensor: str, nodes: np.ndarray) -> np.ndarray:
     """Mark (n,) bool the resting inner-skin nodes (n, 3) m that may come to touch the core.
 
-    They lie in the descriptor's ranges of x and angle, and over 0.1 mm off: nearer ones are beside it and hardly move.
-    """
+    They lie in the descriptor's ranges of x and angle, over 0.1 mm off: nearer ones are beside it and hardly move."""
     x, y, z = nodes.T
     skin = skin_of(sensor)
     (low, high), half = skin.descriptor.core.contact_x, skin.descriptor.core.facing_half_angle

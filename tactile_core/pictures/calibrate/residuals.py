@@ -53,7 +53,8 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """Return the calibration with other numbers (22,), by ``NAMES``, and its gain. Raises TactileError out of range."""
+    """Return the calibration with other numbers (22,), in the order of ``NAMES``, and with the gain that it has now.
+    Raises TactileError for a number out of range."""
     scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()
