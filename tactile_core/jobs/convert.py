@@ -82,7 +82,8 @@ class ToolOptions:
     object_reflectance: float | None = None
 
     def load_networks(self) -> tuple[Translator, str]:
-        """Return the networks, and ``gel``, or "solved" if they do not lead to the target; or raise TactileError."""
+        """Return the networks, and ``gel``, but "solved" if they lead to another gel than the target's. Raises
+        TactileError for weights or a gel that cannot be used, and for two contacts on a gel that is solved."""
         ball_radius(self.gel)  # a bad one is refused
         must_lead_to = None if self.gel != TRANSLATED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)

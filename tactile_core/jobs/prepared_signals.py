@@ -44,7 +44,7 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts of a recording. prepared : ``Signals.report`` of each part; frames : number of frames; labels : all of them
+    """Facts of a recording. prepared : ``Signals.report`` of each part; frames : their number; labels : of all frames
     start_time : unix s, 0 if unknown; film, stiffness : the unit's, divided by a typical unit's"""
 
     recording: str

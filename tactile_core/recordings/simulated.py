@@ -89,7 +89,7 @@ def write_simulated(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """Return the recording in an open file; layout : in words. Raises TactileError for misfits and no electrodes."""
+    """Return the recording in an open file; layout : in words. Raises TactileError if arrays are missing or misfit."""
     if "electrodes" not in store.shapes:
         expected = "readings, which a recording has"
         raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")

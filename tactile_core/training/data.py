@@ -109,15 +109,15 @@ def measured(
     change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0,
     rest_counts: np.ndarray = REST_COUNTS,
 ) -> np.ndarray:  # fmt: skip
-    """Simulate a sensor's reading (B, 20) of a true change (B, 19) counts: the change, and 1 if it is rectified.
+    """Simulate what e electrodes read (B, e + 1) of a true change (B, e) counts: the change, and 1 if it is rectified.
 
     Rectified changes get the sign of a thinning film, as the networks read them. Simulated are a gain error for each
-    channel, noise, whole counts and the ends of 12 bits. The rest lies near that of a typical unit (``rest_counts``,
-    (19,)) and between whole counts, like the mean of many readings.
+    channel, noise, whole counts and the ends of 12 bits. The rest lies near that of a typical unit, ``rest_counts``
+    (e,), and between whole counts, like the mean of many readings.
     unit : share of frames with a real unit's uncertainty: wider gains, an error of the rest
     rectified : share of frames that lose their sign, like those of unknown units, whose tare cannot be corrected after
         rectifying: wider gains, an error of the rest, missing channels
-    Both have an error proportional to the signal's size too, as no simulated contact is quite like a real one."""
+    Frames of either share also have an error in proportion to their size: no simulated contact is quite a real one."""
     folded = rng.random((len(change), 1)) < rectified
     gain = 1.0 + options.gain * rng.standard_normal(change.shape)
     rest = rest_counts + rng.random(change.shape)

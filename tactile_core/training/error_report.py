@@ -40,7 +40,7 @@ SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 
 class Measure:
-    """The exported networks, and the test presses: their rows (C,), and their signals change (C, 19) counts with noise.
+    """The exported networks, and the test presses: their rows (C,), and their signals change (C, e) counts with noise.
     bodies : surfaces of the sensors; seed : the training's, by which noise is drawn"""
 
     def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
@@ -49,7 +49,7 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """Return signed signals (C, 19) counts, with noise, of contacts ``rows`` (C,); stream : number that seeds it"""
+        """Return signed signals (C, e) counts, with noise, of contacts ``rows`` (C,); stream : number that seeds it"""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 
@@ -112,7 +112,7 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Return quantiles of noise alone by `silence`'s names, and their "levels": smaller results may be no contact."""
+    """Return the quantiles of `silence` by its names, and "levels", their shares: smaller results may be noise."""
     return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 

@@ -188,7 +188,7 @@ def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
 
 
 def compress(signal: Tensor) -> Tensor:
-    """Convert signal (B, 20), changes in counts and 1 if rectified, to SVB's input: arcsinh(counts / 15), and 1."""
+    """Convert signal (B, e + 1), changes in counts and 1 if rectified, to SVB's input: arcsinh(counts / 15), and 1."""
     return torch.cat([torch.asinh(signal[:, :-1] / COUNT_SCALE), signal[:, -1:]], -1)
 
 

@@ -48,14 +48,14 @@ class Model(nn.Module):
         initialise(self, generator)
 
     def from_signal(self, signal: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20), counts and 1 if rectified, to latent_source, latent_target of the likeliest contact."""
+        """Map signal (B, e + 1), counts and 1 if rectified, to the likeliest contact's latent_source, latent_target."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         state = torch.where(rectified, self.R2MPN.contact(latent), self.S2MPN.contact(latent))
         biotac, _ = self.given(signal, state)
         return biotac, self.to_target(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) and the contact's state (B, STATE) to latent_source and the state's -log density (B,)."""
+        """Map signal (B, e + 1) and a contact's state (B, STATE) to latent_source and the state's -log density (B,)."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
@@ -74,11 +74,11 @@ class Model(nn.Module):
         return self.D2BPN(self.MVD.placed(latent_target))
 
     def to_signal(self, latent_source: Tensor) -> Tensor:
-        """Map latent_source (B, L) to changes (B, 19) on the networks' scale, arcsinh(counts / 15)."""
+        """Map latent_source (B, L) to changes (B, e) on the networks' scale, arcsinh(counts / 15)."""
         return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_source)))
 
     def expected_error(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20) to log(largest node error / ERROR_UNIT), (B, 2), on BioTac and DIGIT."""
+        """Map signal (B, e + 1) to log(largest node error / ERROR_UNIT), (B, 2), on BioTac and DIGIT."""
         seen = compress(signal)
         latent = self.SVB.mean(seen)
         change = seen[:, :-1]
@@ -87,7 +87,7 @@ class Model(nn.Module):
         return self.error(torch.cat([latent, left, size, seen[:, -1:]], -1))
 
     def directly(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20), see `from_signal`, to the latent (B, L') that `direct_decoder` decodes to the gel."""
+        """Map signal (B, e + 1), see `from_signal`, to the latent (B, L') that `direct_decoder` decodes to the gel."""
         return self.direct(compress(signal))
 
 

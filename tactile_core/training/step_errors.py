@@ -42,7 +42,7 @@ def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray
 
 
 def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return every step's errors on the contacts rows (C,) of pairs, read as ``change`` (C, 19) counts.
+    """Return every step's errors on the contacts rows (C,) of pairs, read as ``change`` (C, e) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); reverse ``D2B`` (DIGIT mesh to BioTac mesh), and ``B2S``,
@@ -111,7 +111,7 @@ def error_columns(
 ) -> Columns:
     """Return columns (B,): ``biotac_max_m``, largest node error of the translation, ``biotac_expected_m``, its
     estimate; the same of digit; ``x_m``, the contact's place along the gel, NaN if no node moves by ``silent`` m.
-    rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as read; rectified : true if without signs"""
+    rows : (B,) indices into the pairs' contacts; change : (B, e) counts, as read; rectified : true if without signs"""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}

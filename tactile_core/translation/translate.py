@@ -165,7 +165,7 @@ def translated(translator: Translator, rows: PreparedRows, frames: np.ndarray) -
 
 
 def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Iterator[Translation]:
-    """Yield translations of rising frames (T,) of a recording, `CHUNK` at a time; rows : it prepared for them"""
+    """Yield translations of rising frames (T,) of a recording, `CHUNK` at a time; rows : its signals"""
     whole = RecordingPass(translator, rows.read, rows.count)
     for start in range(0, len(frames), CHUNK):
         yield whole(frames[start : start + CHUNK]).translation

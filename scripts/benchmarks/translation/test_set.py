@@ -1,4 +1,4 @@
-"""Measure the translation on a test set, contacts solved by the full tier; `bodies` : surfaces, by ``our_bodies``"""
+"""Measure the translation on a test set of contacts that the full tier has solved."""
 
 from __future__ import annotations
 

@@ -208,9 +208,8 @@ def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001,
 @Loop
 def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
     """Return which points touch and which slip after a step, as ``Sorted``.
-    points : after the step, but active, slips, normal and lean of before it; turned : (k, 3), normals where nodes are
-        now
-    stuck_again : (k,) int, how often each node went from slip to stick, counted on in place"""
+    points : as they are after the step, except active, slips, normal and lean, which are those before it
+    turned : (k, 3), normals after the step; stuck_again : (k,) int, counts each node's changes from slip to stick"""
     force, core, active, slips, normal, lean, gap, core_gap, off = points
     k, c = force.shape[0], core.shape[0]
     new_active, new_slips = np.empty(k + c, np.bool_), np.zeros(k, np.bool_)

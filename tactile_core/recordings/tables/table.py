@@ -93,7 +93,7 @@ class Table:
         return labels_of(found)
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return columns `names` (T, n), float32 if exact, NaN for missing ones; TactileError if half are."""
+        """Return columns `names` (T, n), float32 if exact, NaN if missing. Raises TactileError if half are missing."""
         self.taken.update(names)
         held = [name for name in names if self.has(name)]
         if len(held) < len(names) and len(held) > len(names) / 2:
@@ -137,8 +137,8 @@ def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
-    """Return the table in a file. Raises TactileError for no text, an empty, headless or too long one, and twin
-    columns.
+    """Return the table in a file. Raises TactileError if it is no text, or too long, or lacks rows, or has two columns
+    of one name.
     left_out : function that is true for the name of a column that files of over `WHOLE` bytes need not keep"""
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
