@@ -99,6 +99,19 @@ def no_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def coarse_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have fits go a few steps from one depth on pictures of 60 x 80 pixels, for what asks no better ones."""
+    from tactile_core.pictures.calibrate import ball_pictures, checked_fit, fit, press_fit
+
+    minimise = fit.minimise
+    monkeypatch.setattr(ball_pictures, "WORKING_WIDTH", 60)
+    monkeypatch.setattr(press_fit, "DEPTHS", (0.4,))
+    monkeypatch.setattr(press_fit, "TOLERANCE", 1e-3)
+    monkeypatch.setattr(checked_fit, "COARSE_SIDE", 30)
+    monkeypatch.setattr(fit, "minimise", lambda *given, most, **more: minimise(*given, most=min(most, 4), **more))
+
+
+@pytest.fixture
 def slide_csv(tmp_path: Path, write_slide: Callable[[str, int, Path], Path]) -> Callable[..., Path]:
     """``slide_csv("touch", frames=150)`` writes such a recording into the test's own folder."""
 

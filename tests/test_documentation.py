@@ -6,7 +6,6 @@ What a test of its own runs, or what none can run, is listed below with its plac
 import importlib.util
 import os
 import re
-import shlex
 import shutil
 import socket
 import subprocess
@@ -23,6 +22,8 @@ from pressed_unit import PLACES, write_photographs
 
 import tactile_core
 from tactile_core.cli.main import main
+from tactile_core.jobs import pairs
+from tactile_core.jobs.engine import local
 from tactile_core.simulation.scene import load_scene
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "scenes" / "README.md"]
@@ -45,6 +46,7 @@ LESS = [
     ("--workers 8", "--workers 2"),
     ("scenes/press --keep displacement_digit --error 5um", "brief --keep displacement_digit --error 5um"),
     ("simulate scenes/press ", "simulate short "),
+    ("--frames 100:104", "--frames 100:101"),
 ]
 # A press of one frame after rest: each of the full tier takes a second or more, and scenes/press has 200.
 BRIEF = """\
@@ -154,6 +156,13 @@ def inputs(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture
+def workers_here(monkeypatch) -> None:
+    """Jobs run in this process, in blocks of one press: starting workers takes most of a small job's time."""
+    monkeypatch.setattr(local, "Local", lambda folder, workers: local.InProcess(folder))
+    monkeypatch.setattr(pairs, "BLOCK", 1)
+
+
 def write_touch(path: Path, frames: int | None) -> None:
     """The first frames of the recording that ships, as raw readings in CSV."""
     with h5py.File(SHIPPED, "r") as file:
@@ -180,9 +189,9 @@ def run(command: str, folder: Path, capsys: pytest.CaptureFixture) -> tuple[int,
     """Exit status and words of a page's line: of our command line in this process, else in bash."""
     for page, here in LESS:
         command = command.replace(page, here)
-    if command.startswith("tactile ") and not set(command) & set("*|&;$<>"):
+    if command.startswith("tactile ") and not set(command) & set("|&;$<>"):
         try:
-            status = main(shlex.split(command, comments=True)[1:])
+            status = main(in_bash(f"printf '%s\\n' {command}", folder).stdout.splitlines()[1:])
         except SystemExit as end:  # as after --help, and of words that the parser refuses
             status = end.code
         return status, "".join(capsys.readouterr())
@@ -200,7 +209,7 @@ def in_bash(text: str, folder: Path) -> subprocess.CompletedProcess:
 
 @pytest.mark.skipif(os.name == "nt", reason="the pages' commands are written for a Unix shell")
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=lambda page: page.name)
-@pytest.mark.usefixtures("no_sheet")
+@pytest.mark.usefixtures("no_sheet", "coarse_fits", "workers_here")
 def test_commands_work(page, user, monkeypatch, capsys):
     monkeypatch.chdir(user)
     every = commands(page)
