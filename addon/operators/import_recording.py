@@ -139,7 +139,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         """Set the scene's units, but keep those and the frame rate of a scene that is not empty, unless the user chose
         to set them. Return words on what was kept, to end a sentence."""
         if self._in_millimetres(scene):
-            axes.use_millimetres(scene)
+            view.use_millimetres(self, scene)
         if view.is_new(scene) and properties.of_role(scene, "BIOTAC") is None:
             return ""
         if not self.properties.is_property_set("set_timeline"):

@@ -182,6 +182,9 @@ def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarra
         for frame in frames:
             scene.frame_set(int(frame // 1), subframe=float(frame % 1))
             relative = indenter_objects.world_axes(thing, sensor)
+            if thing.tactile.spec and not np.allclose(relative, np.eye(3), atol=1e-4):
+                found, advice = f"turned or scaled on frame {frame:g}", "Remove the keys of its rotation and scale"
+                raise TactileError(thing.name, found, "an upright body on every frame", advice)
             foot = indenter_objects.foot_of(thing, relative, context.evaluated_depsgraph_get())
             apex.append(indenter_objects.place_of(thing, sensor, foot))
             force.append(thing.tactile.force)

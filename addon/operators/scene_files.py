@@ -42,7 +42,7 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
         scene = context.scene
         properties.check_absent(scene, *sensors.PAIR)
         view.hide_untouched(scene)
-        axes.use_millimetres(scene)
+        view.use_millimetres(self, scene)
         group = biotac_objects.new_collection(scene, found.name)
         skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))
         biotac_objects.add_core(group, skin)

@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...tactile_core.translation.trust_words import LOW_CONFIDENCE
+from ..objects import axes
 from ..settings import properties
 
 # Of a new file of Blender's (File > New > General): name, type and place.
@@ -56,6 +57,14 @@ def is_new(scene: bpy.types.Scene) -> bool:
     """Return true if a scene holds nothing of the user's own, so that its units and frame rate may be set."""
     known = _untouched(scene)
     return all(thing.hide_viewport or thing.tactile.role != "NONE" or thing in known for thing in scene.objects)
+
+
+def use_millimetres(operator: bpy.types.Operator, scene: bpy.types.Scene) -> None:
+    """Make a scene's unit a millimetre. The operator says so if the scene holds anything else, whose sizes change."""
+    if not is_new(scene) and not np.isclose(scene.unit_settings.scale_length, 1e-3):
+        words = "The scene's unit is a millimetre now, of its other objects too: what was 2 m long is 2 mm"
+        operator.report({"WARNING"}, f"{words}. Use a scene for each, or set Scene in Millimetres off")
+    axes.use_millimetres(scene)
 
 
 def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:

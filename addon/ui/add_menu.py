@@ -34,7 +34,7 @@ class TACTILE_OT_add_sensor(TactileOperator):
         properties.check_absent(scene, name)
         view.hide_untouched(scene)
         if self.millimetres:
-            axes.use_millimetres(scene)
+            view.use_millimetres(self, scene)
         group, per_metre = context.collection, axes.units_per_metre(scene)
         if role == "BIOTAC":
             thing = biotac_objects.add_skin(group, per_metre, name)

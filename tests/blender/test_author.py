@@ -138,6 +138,28 @@ def test_time_that_is_stretched_is_refused(gel_alone):
         bpy.ops.tactile.simulate()
 
 
+def test_a_body_that_turns_later_is_refused(gel_alone, tmp_path):
+    """It was looked at on the current frame alone, and pressed upright on all."""
+    bpy.ops.tactile.add_indenter(shape="box")
+    box = bpy.context.object
+    box.tactile.press_by, gel_alone.frame_end = "FORCE", 5
+    for frame, angle in ((1, 0.0), (5, 0.5)):
+        box.rotation_euler.z = angle
+        box.keyframe_insert("rotation_euler", frame=frame)
+    gel_alone.frame_set(1)
+    with pytest.raises(RuntimeError, match=r"box: turned or scaled on frame [2-5]; expected an upright body"):
+        _export(tmp_path)
+
+
+def test_a_unit_that_changes_other_objects_is_said(scene, capfd):
+    own = bpy.data.objects.new("robot", bpy.data.meshes.new("robot"))
+    scene.collection.objects.link(own)
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC", millimetres=False)
+    assert scene.unit_settings.scale_length == 1 and "millimetre" not in capfd.readouterr().out
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    assert "Warning: The scene's unit is a millimetre now, of its other objects too" in capfd.readouterr().out
+
+
 def test_an_indenter_in_edit_mode_is_refused(gel_alone, tmp_path):
     """It pressed as it was before it was edited."""
     bpy.ops.tactile.add_indenter(shape="sphere")
