@@ -14,7 +14,7 @@ RECIPE = """\
 format = "tactile-dataset-1"
 files = ["{object}_{session}.npz"]
 tasks = ["object"]
-every = 4
+every = 10
 notes = ["Simulated."]
 
 [source]

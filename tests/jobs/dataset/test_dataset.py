@@ -27,7 +27,7 @@ except ImportError:  # absent, or newer than this numpy
 else:
     LAYOUTS = "imagefolder,lerobot"
 OBJECTS, SESSIONS = ("ball", "rolled"), 6
-FRAMES = 15  # of a recording: every fourth of 60
+FRAMES = 6  # of a recording: every tenth of 60
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -74,7 +74,7 @@ def test_lerobot_keeps_splits_and_even_steps(made):
     pq = pytest.importorskip("pyarrow.parquet", reason=reason, exc_type=ImportError)
     info = json.loads((made / "lerobot" / "meta" / "info.json").read_text())
     assert info["splits"] == {"train": "0:8", "test": "8:12"}
-    assert info["fps"] == 25  # every fourth frame of 100 Hz
+    assert info["fps"] == 10  # every tenth frame of 100 Hz
     table = pq.read_table(made / "lerobot" / "data" / "chunk-000" / "file-000.parquet")
     assert table["frame_index"].to_pylist()[:FRAMES] == list(range(FRAMES))
 
@@ -82,7 +82,7 @@ def test_lerobot_keeps_splits_and_even_steps(made):
 def test_the_card_says_what_was_made_what_failed_and_whose_it_is(made):
     text = (made / "README.md").read_text()
     assert text.index("> Simulated.") < text.index("## What is here")
-    assert "train: 8 recordings, 120 frames" in text and "1 other files of the folder were left alone" in text
+    assert "train: 8 recordings, 48 frames" in text and "1 other files of the folder were left alone" in text
     assert "ball_broken" in text and "Two &lt;objects>" in text and "not stated" in text
     assert re.search(r"\| object \(2\) \| electrodes \| 1\.00 \|", text)  # a press and a roll are easily told
 
@@ -97,7 +97,7 @@ def test_the_same_command_goes_on_with_the_same_bytes(made, recipe):
 
 def test_a_changed_recipe_does_not_overwrite(made, recipe, tmp_path, capsys):
     other = tmp_path / "other.toml"
-    other.write_text(recipe.read_text().replace("every = 4", "every = 3"))
+    other.write_text(recipe.read_text().replace("every = 10", "every = 3"))
     assert main(["dataset", str(other), str(made.parent / "in"), "--out", str(made)]) == 2
     assert "holds another job" in capsys.readouterr().err
 
@@ -132,15 +132,15 @@ def test_the_example_learns_from_the_pictures(made):
         (('"{object}_{session}.npz"', '"{object}_{object}.npz"'), "different labels"),
         (('"{object}_{session}.npz"', '"{frame}_{session}.npz"'), "different labels"),
         (('by = "session"', 'by = "sesion"'), "a label of files: object, session"),
-        (("every = 4", "every = 0"), "every"),
-        (("every = 4", "evry = 2"), "evry"),
+        (("every = 10", "every = 0"), "every"),
+        (("every = 10", "evry = 2"), "evry"),
         (('"tactile-dataset-1"', '"tactile-dataset-9"'), "tactile-dataset-1"),
         (('"{object}_{session}.npz"', '"{object}_{session}.mat"'), "expected {object}_{session}.mat"),
         (('"rest.npz"', '"away.npz"'), "away.npz: missing"),
         (('"rest.npz"', '"{session}_rest.npz"'), "unit.by"),
         (('"{object}_{session}.npz"', '"{confidence}_{session}.npz"'), "none of"),
         (('"{object}_{session}.npz"', '"{1}_{session}.npz"'), "named as in Python"),
-        (("every = 4", 'every = 4\nsensor = "biotac_sp"'), "a recording of a BioTac; expected one of a BioTac SP"),
+        (("every = 10", 'every = 10\nsensor = "biotac_sp"'), "a recording of a BioTac; expected one of a BioTac SP"),
         (('rest = "rest.npz"\n', ""), "both or none"),
     ],
 )
@@ -231,7 +231,7 @@ def small(folder: Path, recipe: Path, tmp_path: Path, *changes: tuple[str, str])
     (tmp_path / "in").mkdir()
     for name in ("ball_0", "rolled_4", "rest"):
         shutil.copy(folder / f"{name}.npz", tmp_path / "in")
-    text = recipe.read_text().replace("every = 4", "every = 20")
+    text = recipe.read_text().replace("every = 10", "every = 20")
     for change in changes:
         text = text.replace(*change)
     (tmp_path / "own.toml").write_text(text)
