@@ -22,6 +22,7 @@ NEEDS = {"render_standard": "mitsuba", "train": "torch", "mesh_full": "pypardiso
 def scratch(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lean")
     profile.write_inputs(folder)
+    profile.write_scene(folder, (0.0, -8.0, 0.0, 0.0), (0.01, -8.0, 0.0, 0.3))  # two frames load what many do
     return folder
 
 

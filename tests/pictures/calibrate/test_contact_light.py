@@ -16,6 +16,7 @@ from tactile_core.sensors.calibration import Coating
 THIN = dataclasses.replace(plain_unit().at_size(60, 80), coating=Coating(transmission=0.25))
 
 
+@pytest.mark.usefixtures("coarse_fits")
 @pytest.mark.parametrize("reflectance", [0.0, 0.8])
 def test_object_shows_through_in_the_photographs_of_others(tmp_path: Path, reflectance: float) -> None:
     """Rows `through` know the object from the other photographs; all others are of the file's black one."""
@@ -30,6 +31,7 @@ def test_object_shows_through_in_the_photographs_of_others(tmp_path: Path, refle
         assert (found.metrics["roi_l1"] > 1.5 * found.metrics["through_l1"]) == bright
 
 
+@pytest.mark.usefixtures("coarse_fits")
 def test_fit_tells_the_coating_s_transmission_of_a_known_object(tmp_path: Path) -> None:
     shown = dataclasses.replace(THIN, object_reflectance=0.6)
     folder = write_photographs(tmp_path / "presses", shown, PLACES[:3])

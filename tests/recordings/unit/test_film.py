@@ -157,12 +157,12 @@ def test_force_of_a_real_finger_is_of_the_right_size(forced):
 
 
 def test_one_scale_by_half_of_a_measured_force_is_written_where_it_helps_the_other_half(outside_data, tmp_path, capsys):
-    """`adapt --rest --force` on every tenth row; a constant force leaves .6 N."""
+    """`adapt --rest --force` on every thirtieth row; a constant force leaves .6 N."""
     folder, unit = outside_data("biotac_force"), tmp_path / "unit.toml"
     names = ", ".join(f'"column{k}"' for k in range(1, 20))
-    (tmp_path / "map.toml").write_text(f'format = "tactile-columns-1"\nrate = 10\nelectrodes = [{names}]\n')
+    (tmp_path / "map.toml").write_text(f'format = "tactile-columns-1"\nrate = 3.3333\nelectrodes = [{names}]\n')
     for name in ("counts", "force"):
-        np.savetxt(tmp_path / f"{name}.txt", np.loadtxt(folder / f"finger1_{name}.txt")[::10], fmt="%.7g")
+        np.savetxt(tmp_path / f"{name}.txt", np.loadtxt(folder / f"finger1_{name}.txt")[::30], fmt="%.7g")
     rest, force = str(folder / "finger1_rest.txt"), str(tmp_path / "force.txt")
     words = ["--columns", str(tmp_path / "map.toml"), "--rest", rest, "--force", force, "--out", str(unit)]
     assert main(["adapt", str(tmp_path / "counts.txt"), *words]) == 0
