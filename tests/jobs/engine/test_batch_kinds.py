@@ -11,6 +11,7 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.files import checksummed
 from tactile_core.jobs.engine import job as jobs
+from tactile_core.jobs.engine import local
 
 
 @pytest.fixture
@@ -28,19 +29,20 @@ def run(*words):
     assert main([str(word) for word in words]) == 0
 
 
-def by_parts(tmp_path, *words):
-    """Plan, two runners of an array, and the command again: the result's folder."""
+def by_parts(tmp_path, monkeypatch, *words):
+    """Plan, two runners of an array, one with a worker, and the command again: the result's folder."""
     out = tmp_path / "parts"
     run(*words, "--out", out, "--plan")
     for part in ("1/2", "0/2"):
         run("batch", "--out", f"{out}.parts", "--array", part)
+        monkeypatch.setattr(local, "Local", lambda folder, workers: local.InProcess(folder))
     run("batch", "--out", f"{out}.parts", "--verify")
     run(*words, "--out", out, "--workers", "1")
     assert not out.with_name("parts.parts").exists()
     return out
 
 
-def test_a_grid_of_recordings(scene, tmp_path):
+def test_a_grid_of_recordings(scene, tmp_path, monkeypatch):
     # The gel alone: each of the processes that simulate would set up the skin's films anew, half of its time.
     words = ["simulate", scene, "--grid", "force_n=0.2,0.4", "--seed", "5", "--keep", "displacement_digit"]
     run(*words, "--out", tmp_path / "one")
@@ -50,7 +52,7 @@ def test_a_grid_of_recordings(scene, tmp_path):
         # of the axial force, tilted skin
         assert np.linalg.norm(file["truth/force"][-1]) == pytest.approx(0.4, rel=0.05)
         assert file.attrs["seed"] == 6 and "0.4" in file.attrs["scene"]
-    assert tree(by_parts(tmp_path, *words)) == tree(tmp_path / "one")
+    assert tree(by_parts(tmp_path, monkeypatch, *words)) == tree(tmp_path / "one")
 
 
 def test_a_grid_is_refused_before_any_work(scene, tmp_path, capsys):
@@ -80,10 +82,10 @@ def heights(tmp_path):
     return tmp_path / "heights.npz"
 
 
-def test_pictures(heights, tmp_path):
+def test_pictures(heights, tmp_path, monkeypatch):
     words = ["render", heights, "--preset", "fast", "--frames", "1:3", "--noise"]
     run(*words, "--out", tmp_path / "one")
-    assert tree(by_parts(tmp_path, *words)) == tree(tmp_path / "one")
+    assert tree(by_parts(tmp_path, monkeypatch, *words)) == tree(tmp_path / "one")
     assert sorted(tree(tmp_path / "one")) == ["images/00001.png", "images/00002.png", "note.json"]
 
 
