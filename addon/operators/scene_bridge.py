@@ -14,6 +14,7 @@ from ...tactile_core.errors import TactileError
 from ..objects import curves, indenter_objects, motion
 from ..settings import properties
 
+PRESSED = "tactile_pressed"  # property of an indenter: its path, m, that its forces were found for
 DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender."}
 DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
 _STRAIGHT = 1e-7  # m and N, off a straight line, taken for float32's rounding

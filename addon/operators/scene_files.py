@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -111,6 +112,9 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
             advice = "Simulate first, or press by force"
             raise TactileError(thing.name, "no forces yet", "what a scene file holds of a press", advice)
         found = scene_bridge.authored(context)
+        if found.apexes is not None and not _same_path(found.apexes, thing.get(scene_bridge.PRESSED)):
+            advice = "Simulate again, or press by force"
+            raise TactileError(thing.name, "moved since its forces were found", "forces of this motion", advice)
         write_scene(path.parent, found.scene, found.meshes)
         self.report({"INFO"}, f"{path}: {len(found.scene.recording.points)} points")
 
@@ -135,6 +139,11 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
             np.save(folder / "heights.npy", height_map(moved, shown.unit.camera))
             Job("picture_scene", folder, path=path).wait()
         self.report({"INFO"}, path + "; other lamps and bodies are left out" * bool(shown.around))
+
+
+def _same_path(apexes: np.ndarray, pressed: Sequence[float] | None) -> bool:
+    """Return true if an indenter's path, (P, 3) m, is the one ``pressed``, its numbers in a row; None: an older file"""
+    return pressed is None or (len(pressed) == apexes.size and np.allclose(pressed, apexes.ravel(), atol=1e-6))
 
 
 def _has_force(thing: bpy.types.Object) -> bool:

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import shutil
 from pathlib import Path
 
 import bpy
@@ -10,7 +9,6 @@ import numpy as np
 from mathutils import Matrix
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.files import atomic
 from ...tactile_core.sensors import SAMPLE_RATE
 from ..objects import axes, curves, indenter_objects, mesh_cache, motion
 from ..process.jobs import Job, JobFolder
@@ -158,6 +156,7 @@ class TACTILE_OT_simulate(JobOperator):
         self._frames = np.arange(context.scene.frame_start, context.scene.frame_end + 1, dtype=float)
         self._folder = JobFolder()
         write_scene(self._folder.path, found.scene, found.meshes)
+        self._apexes = found.apexes
         if found.apexes is not None:
             np.savez(self._folder.path / "heights.npz", apex=found.apexes)
         bound = render_settings.budget_of(context.scene).um
@@ -170,6 +169,8 @@ class TACTILE_OT_simulate(JobOperator):
         thing = properties.found_again(context.scene, *self._thing, "the indenter that was simulated")
         result = read(self._folder.path)
         summary = bake(context, thing, result, self._frames, self._rate)
+        if self._apexes is not None:
+            thing[scene_bridge.PRESSED] = self._apexes.ravel().tolist()
         try:
             self._keep(context, thing)
         except OSError as error:  # what it baked is kept
@@ -194,9 +195,10 @@ class TACTILE_OT_simulate(JobOperator):
         if skin is None:
             return
         skin.tactile.recording = ""  # an earlier one's
-        path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(thing.name)}.h5"
-        with atomic.new_file(path) as partial:
-            shutil.copyfile(self._folder.path / "recording.h5", partial)
+        named = self._folder.path / f"{bpy.path.clean_name(thing.name)}.h5"
+        (self._folder.path / "recording.h5").rename(named)
+        # Beside what is there: another .blend of the folder, or a step to undo to, may be of an earlier one.
+        path = kept_files.copied(named, kept_files.folder(kept_files.SIMULATIONS))
         skin.tactile.recording, skin.tactile.tare, skin.tactile.known = kept_files.shown(path), "auto", ""
         skin.tactile.frames, skin.tactile.first_frame = ":", int(self._frames[0])
         skin.tactile.samples = SAMPLE_RATE / self._rate

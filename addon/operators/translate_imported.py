@@ -83,9 +83,9 @@ class TACTILE_OT_translate(JobOperator):
                 self.report({"WARNING"}, words)
         skin = properties.found_again(context.scene, *self._skin, "the skin that was translated")
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
+        gel, new = _gel_beside(context.scene, skin, self._target)
         if skin.tactile.known and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
             play(skin, self._found, frames)
-        gel, new = _gel_beside(skin, self._target)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
         values = self._found.columns()
         told = {name: values[name] for name in ("force", "confidence", "explained")}
@@ -99,18 +99,24 @@ class TACTILE_OT_translate(JobOperator):
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 
-def _gel_beside(skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:
+def _gel_beside(scene: bpy.types.Scene, skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:
     """Return the gel of the kind ``sensor`` beside a skin, and true if it was missing and has been added.
 
     An old gel keeps its LEDs, coating and camera as the user set them; of several, as of a copied pair, it is the one
-    nearest to where this skin's would be added.
+    nearest to where this skin's would be added. One that was moved to another collection is known by its forces.
     """
     group = properties.home_of(skin)
-    there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
+    gels = [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]
+    gels = [thing for thing in gels if properties.sensor_name(thing) == sensor]
     place = skin.location + Vector((0.0, digit_objects.BESIDE * skin.tactile.per_metre, 0.0))
-    found = [thing for thing in there if properties.sensor_name(thing) == sensor]
+    found = [thing for thing in gels if thing in group.objects.values()] or [
+        thing for thing in gels if "force" in thing and _forces(thing) == _forces(skin)]  # fmt: skip
     same = min(found, key=lambda thing: (thing.location - place).length, default=None)
     return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor), same is None
+
+
+def _forces(sensor: bpy.types.Object) -> list[list[float]]:
+    return [curves.values_of(sensor, '["force"]', axis).tolist() for axis in range(3)]
 
 
 CLASSES = (TACTILE_OT_translate,)

@@ -69,12 +69,12 @@ def _copy_beside(file: str, *_: object) -> None:
             continue
         _named.append((holder, name, value, path if own else None))
         if own or path.parent == here / kind:
-            path = _copied(path, there / kind)
+            path = copied(path, there / kind)
         # Blender itself turns a modifier's relative path to where it saves, but no add-on's.
         setattr(holder, name, _relative(path, here if here and kind == CACHE else there))
 
 
-def _copied(path: Path, folder: Path) -> Path:
+def copied(path: Path, folder: Path) -> Path:
     """Put a file into a folder and return its path there. It gets a new name if another .blend's file has its own.
 
     A hard link will do: the add-on never changes a file but replaces it, so that another link keeps the old bytes.

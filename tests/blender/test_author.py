@@ -371,6 +371,23 @@ def test_heights_have_no_forces_before_they_are_simulated(sensors, tmp_path):
         _export(tmp_path)
 
 
+def test_forces_of_an_earlier_motion_are_not_exported(gel_alone, tmp_path):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    ball = bpy.context.object
+    gel_alone.frame_start, gel_alone.frame_end = 1, 2
+    for frame, depth in ((1, 0.0), (2, 0.3)):
+        bpy.ops.tactile.snap_to_gel(depth=depth)
+        ball.keyframe_insert("location", frame=frame)
+    bpy.ops.tactile.simulate()
+    ball.parent.location.x += 90
+    _export(tmp_path)  # the same press elsewhere
+    gel_alone.frame_set(2)
+    bpy.ops.tactile.snap_to_gel(depth=0.6)
+    ball.keyframe_insert("location", frame=2)
+    with pytest.raises(RuntimeError, match=r"sphere: moved since its forces were found.* Simulate again"):
+        _export(tmp_path)
+
+
 def test_an_unwritable_folder_is_reported(scene, tmp_path):
     bpy.ops.tactile.import_scene(filepath=str(ROOT / "scenes" / "press" / "scene.toml"))
     (tmp_path / "file").write_text("in the way")
@@ -495,6 +512,23 @@ def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, part
     skin = bpy.context.scene.objects["BioTac skin"]
     assert skin.tactile.recording == "//tactile_simulations/sphere.h5"
     bpy.ops.tactile.translate()
+
+
+def test_each_version_of_a_blend_keeps_its_own_recording(scene, tmp_path):
+    """The next simulation replaced the file that an earlier .blend of the folder, or an undo, was translated by."""
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one.blend"))
+    skin, kept = scene.objects["BioTac skin"], []
+    _press(scene)
+    for name, force in (("one.blend", 0.1), ("two.blend", 0.3)):
+        for frame in (1, 3):
+            _key(scene.objects["sphere"], frame, force=force)
+        bpy.ops.tactile.simulate()
+        kept.append(Path(bpy.path.abspath(skin.tactile.recording)).read_bytes())
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "one.blend"))
+    skin = bpy.context.scene.objects["BioTac skin"]
+    assert kept[0] != kept[1] and Path(bpy.path.abspath(skin.tactile.recording)).read_bytes() == kept[0]
 
 
 def test_a_biotac_alone_is_simulated_without_a_digit(scene, part, tmp_path, capfd):

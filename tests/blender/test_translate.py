@@ -148,6 +148,21 @@ def test_low_confidence_is_marked_on_the_timeline(scene, part):
     assert not scene.timeline_markers
 
 
+def test_a_gel_in_a_collection_of_the_user_s_is_translated_again(imported, gel):
+    """A second gel took its place, while the first still played the former translation."""
+    scene, own = bpy.context.scene, bpy.data.collections.new("gels")
+    skin = scene.objects["BioTac skin"]
+    scene.collection.children.link(own)
+    skin.users_collection[0].objects.unlink(gel)
+    own.objects.link(gel)
+    bpy.context.view_layer.objects.active, skin.tactile.tare = skin, "0:20"
+    bpy.ops.tactile.translate()
+    assert [*gel["force"]] == [*skin["force"]]
+    imported(frames="40:50")  # another recording has a gel of its own
+    bpy.ops.tactile.translate()
+    assert sum(thing.tactile.role == "DIGIT" for thing in scene.objects) == 2
+
+
 def test_translating_again_replaces_the_gel(gel):
     bpy.ops.tactile.translate()
     assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
