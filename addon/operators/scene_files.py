@@ -142,7 +142,8 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
 
 
 def _same_path(apexes: np.ndarray, pressed: Sequence[float] | None) -> bool:
-    """Return true if an indenter's path, (P, 3) m, is the one ``pressed``, its numbers in a row; None: an older file"""
+    """Return true if an indenter's path is the one that its forces were found for, or if that is not known.
+    apexes : (P, 3) m, the path; pressed : 3 P numbers, m, the other one; None in an older file"""
     return pressed is None or (len(pressed) == apexes.size and np.allclose(pressed, apexes.ravel(), atol=1e-6))
 
 
