@@ -7,6 +7,7 @@ import math
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures.mitsuba.gel_scene import Lamp, Occluder, Surroundings
@@ -93,7 +94,7 @@ def _same(new, old) -> bool:  # noqa: ANN001
 
 def _lamp(thing: bpy.types.Object, gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> Lamp:
     now = thing.evaluated_get(depsgraph)
-    place = _places(gel, depsgraph, [now.matrix_world.translation[:]], camera)[0]
+    place = _places(gel, depsgraph, [_world(thing, depsgraph).translation[:]], camera)[0]
     per_metre = gel.tactile.per_metre
     lamp = now.data
     energy = max(lamp.energy, 0.0) * 2 ** getattr(lamp, "exposure", 0.0)  # it and temperature: since Blender 4.5
@@ -102,6 +103,14 @@ def _lamp(thing: bpy.types.Object, gel: bpy.types.Object, depsgraph: bpy.types.D
     if getattr(lamp, "use_temperature", False):
         colour *= lamp.temperature_color[:3]
     return Lamp(tuple(place.tolist()), lamp.shadow_soft_size / per_metre, tuple((brightness * colour).tolist()))
+
+
+def _world(thing: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """Return an object's matrix to world axes. Blender does not move one that is disabled in views with its parent."""
+    now, parent = thing.evaluated_get(depsgraph), thing.parent
+    if parent is None or thing.parent_type != "OBJECT" or not thing.hide_viewport or depsgraph.mode == "RENDER":
+        return now.matrix_world
+    return _world(parent, depsgraph) @ now.matrix_parent_inverse @ now.matrix_basis
 
 
 def _lamps(gel, depsgraph, camera: Camera, rendered: set[bpy.types.Object]) -> list[Lamp]:  # noqa: ANN001
@@ -222,7 +231,7 @@ def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camer
         found = f"type {lens.type}, sensor fit {lens.sensor_fit}, shift {lens.shift_x:g} and {lens.shift_y:g}"
         expected = "a perspective camera, its sensor fit vertical, without shift"
         raise TactileError(thing.name, found, expected, "Set them so, or Reset to Calibration")
-    relative = axes.from_world(gel.evaluated_get(depsgraph)) @ now.matrix_world
+    relative = axes.from_world(gel.evaluated_get(depsgraph)) @ _world(thing, depsgraph)
     own = np.array(relative.to_3x3().normalized())
     forward, right = -own[:, 2], own[:, 0]
     if forward[2] < 1 - _STRAIGHT or abs(abs(right[1]) - 1) > _STRAIGHT:

@@ -161,6 +161,7 @@ def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
     if not path.is_file():
         raise TactileError(path, "there is no such file", "a .blend", "Check the path")
     bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))
+    bpy.context.view_layer.objects.active = None  # F12 renders the camera's gel, not the active one's
     _claimed(folder, options)
     _pictures(folder, options)
 

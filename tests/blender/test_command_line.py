@@ -29,6 +29,21 @@ def test_render_draws_a_blend(run, slide_csv, tmp_path):
     assert len(list((tmp_path / "pictures" / "touch" / "images").glob("*.png"))) == 2
 
 
+def test_render_draws_the_gel_of_the_blend_s_camera(run, imported, tmp_path):
+    """As F12 does; it drew the gel that was selected when the file was saved."""
+    for frames in ("80:81", "90:91"):
+        imported(frames=frames)
+        bpy.ops.tactile.translate()
+        bpy.ops.tactile.set_up_render()
+    scene, objects = bpy.context.scene, bpy.context.view_layer.objects
+    seen, objects.active = scene.camera.name, scene.objects["DIGIT gel"]
+    assert scene.camera.parent != objects.active
+    scene.frame_start = scene.frame_end = 90
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
+    assert run("render", tmp_path / "two.blend", "--out", tmp_path) == 0
+    assert bpy.context.scene.camera.name == seen
+
+
 def test_a_batch_goes_on_after_a_failure_and_names_it(run, slide_csv, tmp_path, capfd):
     folder = tmp_path / "day"
     folder.mkdir()

@@ -298,6 +298,15 @@ def test_what_a_hidden_collection_holds_is_off(shown, gel, by):
     assert not shown().around and shown().unit.leds[0].radiance == 0 < shown().unit.leds[1].radiance
 
 
+def test_parts_that_are_disabled_in_views_move_with_the_gel(gel, drawn):
+    """Blender leaves them where they were: the panel's picture was lit from there."""
+    before = drawn()
+    for thing in gel.children_recursive:
+        thing.hide_viewport = True
+    gel.location, gel.rotation_euler.z = (7.0, -3.0, 2.0), 0.4
+    assert np.abs(drawn() - before).max() <= 1  # a level: places are float32
+
+
 def test_an_animation_follows_an_led_that_is_keyed_off(gel, tmp_path):
     scene, led = bpy.context.scene, bpy.data.objects["LED red"]
     for frame, off in ((1, True), (2, False)):
