@@ -22,6 +22,7 @@ from .card import REST, check_pair, check_tables
 from .contact_track import Evidence, Tracker, needed
 from .simulated_likeness import patterns_of, shipped_patterns
 from .translator import Translation, Translator
+from .weights import read_card
 
 if TYPE_CHECKING:
     from ..recordings.electrode_gains import ElectrodeGains
@@ -147,8 +148,8 @@ def translate(
         expected = f"a slice forward through {len(recording)} frames that holds at least one"
         raise TactileError("translate, frames", str(frames), expected)
     folder = None if weights is None else path_text(weights, "translate, weights", "a folder's name")
-    chosen_by = (folder, recording.sensor if folder is None else None)
-    translator, unit = _shared_translator(*chosen_by, answer), None
+    card = None if folder is None else read_card(folder)[1]  # the folder may hold other weights than at the last call
+    translator, unit = _shared_translator(folder, card, recording.sensor if folder is None else None, answer), None
     if sensor is not None:
         from ..recordings import electrode_gains  # reads by msgspec, which Blender has by the extension's wheels alone
 
@@ -172,8 +173,8 @@ def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndar
 
 
 @lru_cache(maxsize=2)
-def _shared_translator(weights: str | None, source: str | None, answer: Answer) -> Translator:
-    """Load networks for `translate`, which keeps them: 13 MB, a quarter of a second."""
+def _shared_translator(weights: str | None, card: str | None, source: str | None, answer: Answer) -> Translator:
+    """Load networks for `translate`, which keeps them as long as their card has the hash ``card``: 13 MB, .25 s."""
     return load_translator(weights, answer, None, source)
 
 

@@ -1,5 +1,8 @@
 """A whole recording in one call: the same as the command's result, whatever part of it is requested."""
 
+import json
+import shutil
+
 import h5py
 import numpy as np
 import pytest
@@ -8,6 +11,7 @@ from tactile_core.errors import TactileError
 from tactile_core.jobs.convert import Options, ToolOptions, convert, load_tools
 from tactile_core.recordings import PrepareOptions, electrode_gains
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
+from tactile_core.translation import networks
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.translate import translate
 
@@ -69,3 +73,15 @@ def test_options_of_another_kind_are_refused(given, said, shipped):
 def test_answers_that_there_are_not_are_refused(given):
     with pytest.raises(TactileError, match=f"Answer, {next(iter(given))}: "):
         Answer(**given)
+
+
+def test_weights_that_replace_others_in_their_folder_are_the_ones_that_translate(shipped, tmp_path):
+    folder = tmp_path / "weights"
+    shutil.copytree(networks.WEIGHTS_FOLDER, folder)
+    before = translate(shipped, frames=slice(100, 101), weights=folder)
+    card = json.loads((folder / "card.json").read_text(encoding="utf-8"))  # as by training anew into the same folder
+    for values in card["error_bounds"].values():
+        values["digit"][0] *= 2
+    (folder / "card.json").write_text(json.dumps(card), encoding="utf-8")
+    after = translate(shipped, frames=slice(100, 101), weights=folder)
+    np.testing.assert_allclose(after.error_bound_digit, 2 * before.error_bound_digit, rtol=1e-6)
