@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 import logging
 import os
@@ -17,7 +16,7 @@ from ..errors import TactileError, finite_number
 from ..files.installed import require
 from ..geometry.indenters import Indenter, Pose, as_indenter
 from ..mechanics.fast.active_set import UnsolvedError, Work
-from ..mechanics.fast.compliance import Compliance, compliance_of
+from ..mechanics.fast.compliance import compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
@@ -62,9 +61,8 @@ class Gel:
     without the extra [fem], and without [render] for presets other than ``fast``."""
 
     def __init__(
-        self, sensor: str = sensors.TARGET, indenter: Any = None, *,
-        friction: float = FRICTION, calibration: Calibration | str | os.PathLike[str] | None = None, preset: str = FAST,
-        texture: np.ndarray | None = None,
+        self, sensor: str = sensors.TARGET, indenter: Any = None, *, friction: float = FRICTION, preset: str = FAST,
+        calibration: Calibration | str | os.PathLike[str] | None = None, texture: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         if preset not in NAMES:
             raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
@@ -80,6 +78,8 @@ class Gel:
         if self._calibration is not None and self._calibration.camera.sensor != sensor:
             found = f"of a {sensors.title(self._calibration.camera.sensor)}"
             raise TactileError("Gel, calibration", found, f"one of a {sensors.title(sensor)}")
+        self._drawer: Renderer | None = None
+        self._by = self.indenter, self.friction  # of the last step
         self.reset()
 
     def __repr__(self) -> str:
@@ -91,8 +91,8 @@ class Gel:
         self._work = Work()
         self._pose: Pose | None = None  # of the step before
         self._touch: tuple[Pose, float] | None = None  # the first touch found last, and the greatest depth there, m
-        self._under = Pose(np.zeros(3), np.eye(3), PUSH)  # of the contact that was solved last
-        self._contact = GelContact.untouched(len(self.surface.rest), self._under)
+        self._under = self.indenter, Pose(np.zeros(3), np.eye(3), PUSH)  # of the contact that was solved last
+        self._contact = GelContact.untouched(len(self.surface.rest), self._under[1])
 
     def press(self, pose: Any, force: float | None = None) -> GelContact:
         """Move the indenter to a pose, along a straight line from the last one, and return the contact there.
@@ -107,9 +107,11 @@ class Gel:
         """Do the work of ``press`` for a checked pose and force, N."""
         flags: list[str] = []
         self._work.left = _WORK
-        jumps = self._press is not None and self._contact.patch.any() and too_far(self._pose, here)
-        if jumps:
-            self._press = None
+        by = self.indenter, self.friction = as_indenter(self.indenter), friction_of(self.friction, "Gel, friction")
+        other, self._by = by[0] is not self._by[0] or by[1] != self._by[1], by  # true if one was set since
+        jumps = self._press is not None and self._contact.patch.any() and (other or too_far(self._pose, here))
+        if jumps or other:
+            self._press, self._touch = None, None
         before, self._pose = self._pose, here
         if force is not None and force < _NO_FORCE:
             self._press, self._contact = None, GelContact.untouched(len(self.surface.rest), here)
@@ -171,13 +173,13 @@ class Gel:
         with folds_counted():
             heights = gel_mapper(camera)(self._contact.displacement)
         touching = (self.surface.rest + self._contact.displacement)[self._contact.patch]
-        return out_of_body(heights, camera, self.indenter, self._under, touching)
+        return out_of_body(heights, camera, *self._under, touching)
 
     def picture(self) -> np.ndarray:
         """Return the picture (H, W, 3) uint8 of the last contact. Raises TactileError for a sensor without camera."""
         heights, reflectance = self.height_map(), None
         if self.texture is not None and self._contact.patch.any():
-            reflectance = reflectance_on(self.texture, heights, self._renderer.camera, self.indenter, self._under)
+            reflectance = reflectance_on(self.texture, heights, self._renderer.camera, *self._under)
         return self._renderer(heights, self._renderer.marks(self._contact.displacement), reflectance)
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
@@ -186,7 +188,7 @@ class Gel:
         x, z, depth = (finite_number(each, "Gel.touching", "x, z and depth in m", -1.0, 1.0) for each in (x, z, depth))
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         place = Pose(np.array([x, 0.0, z]), axes, PUSH)
-        return matrix_of(first_touch_on_line(self.surface, self.indenter, place).moved(depth))
+        return matrix_of(first_touch_on_line(self.surface, as_indenter(self.indenter), place).moved(depth))
 
     def _touch_and_limit(self, pose: Pose) -> tuple[Pose, float]:
         """Return the pose at first touch and the greatest depth, m; the last ones if a pose differs in depth alone."""
@@ -195,13 +197,11 @@ class Gel:
             self._touch = touch, DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
         return self._touch
 
-    @functools.cached_property
+    @property
     def _renderer(self) -> Renderer:
-        return Renderer(self._calibration or load_calibration(None, self.sensor), self.preset)
-
-    @functools.cached_property
-    def _compliance(self) -> Compliance:
-        return compliance_of(self.sensor)
+        if self._drawer is None or self._drawer.preset != self.preset:
+            self._drawer = Renderer(self._calibration or load_calibration(None, self.sensor), self.preset)
+        return self._drawer
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
         """Return the contact at a pose, or None; if none is solved, that of an indenter that comes straight in.
@@ -239,7 +239,8 @@ class Gel:
         if began and force is None and depth > _BEGUN_INSIDE:
             flags.append("began inside")
         if self._press is None:
-            self._press = CorrectedPress(self._compliance, self.indenter, touch, limit, self.friction, self._work)
+            solid = compliance_of(self.sensor)
+            self._press = CorrectedPress(solid, self.indenter, touch, limit, self.friction, self._work)
         self._press.limit = limit
         try:
             if force is not None:
@@ -276,8 +277,7 @@ class Gel:
                     return self._at_depth(press, touch, share * limit)
                 except UnsolvedError:
                     continue
-        if self._work.left <= 0:
-            flags.append("too large")
+        flags += ["too large"] * (self._work.left <= 0)
         nearest = press.nearest()
         if nearest is None:
             raise UnsolvedError(f"no contact at {force:g} N")
@@ -288,8 +288,8 @@ class Gel:
             return dataclasses.replace(self._contact, pose=matrix_of(pose), flags=tuple(flags))
         if found is None:
             return dataclasses.replace(GelContact.untouched(len(self.surface.rest), pose), flags=tuple(flags))
-        linear, nodes = found.linear, self._compliance.touchable[found.linear.nodes]
-        self._under = linear.pose
+        linear, nodes = found.linear, compliance_of(self.sensor).touchable[found.linear.nodes]
+        self._under = self.indenter, linear.pose
         pressed = traction(self.sensor, nodes, found.corrected.factor * linear.nodal_force)
         patch = np.zeros(len(pressed), bool)
         patch[nodes] = True

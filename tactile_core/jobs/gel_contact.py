@@ -28,7 +28,8 @@ FLAGS = {
     "too sharp": "a tip, edge or wire is so thin that it sinks in between the surface's nodes: .35 mm apart on the "
     "DIGIT, .5 to .9 on the BioTac",
     "friction forgotten": "no equilibrium was found on the path; the indenter was taken to come straight in along +y",
-    "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in along +y",
+    "jumped": "the step is too long, or of another indenter or friction, to go on from the contact before; friction "
+    "was forgotten, and the indenter taken to come in along +y",
 }
 
 

@@ -347,3 +347,18 @@ def test_first_touch_is_looked_for_once_a_line(monkeypatch):
         gel.press(shifted(pose, y=depth))
     assert len(looked) == 1
     assert gel.press(shifted(pose, x=0.1e-3, y=0.3e-3)).depth > 0 and len(looked) == 2  # slid
+
+
+def test_another_indenter_friction_or_preset_counts_from_the_next_step():
+    poses = path(gel := Gel("digit", BALL))
+    *_, before = gel.follow(poses)
+    shown = gel.picture()
+    gel.indenter = Sphere(5e-3)
+    np.testing.assert_array_equal(gel.picture(), shown)  # of the contact that was solved
+    after, wide = gel.press(poses[-1]), Gel("digit", Sphere(5e-3))
+    assert after.flags == ("jumped",) and same(after, wide.press(poses[-1])) and not same(after, before)
+    np.testing.assert_array_equal(gel.picture(), wide.picture())
+    gel.friction = 0.0
+    assert gel.press(poses[-2]).slipping == 0 and "jumped" not in gel.press(poses[-1]).flags
+    gel.preset = "standard"
+    assert gel._renderer.preset == "standard"
