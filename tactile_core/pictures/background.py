@@ -124,7 +124,7 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
 def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np.ndarray:
     """Read an image file as a picture (H, W, 3) uint8, red, green, blue. Raises TactileError for a file that is no
     image of 8 bits a colour, and for a size other than that of ``camera``'s pictures (None accepts any)."""
-    from PIL import Image
+    from PIL import Image, ImageOps
 
     expected = f"an image file of 8 bits a colour ({', '.join(FORMATS)})"
     try:
@@ -137,7 +137,7 @@ def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np
                 raise ValueError("it has no colours")
             if image.format in ("PNG", "TIFF") and getattr(image, "n_frames", 1) > 1:  # the others would be lost
                 raise ValueError("several pictures in one file")
-            picture = np.asarray(image.convert("RGB"))
+            picture = np.asarray(ImageOps.exif_transpose(image).convert("RGB"))  # as viewers show it
     except TactileError:
         raise
     except Exception as error:  # the library raises a dozen types on damaged bytes

@@ -73,3 +73,14 @@ def test_a_scenes_picture_has_the_shipped_background(path):
 
 def test_all_are_here():
     assert len(PICTURES) == 7
+
+
+@pytest.mark.parametrize("name", ["turned.jpg", "turned.png", "turned.tiff"])
+def test_a_photograph_is_read_as_viewers_show_it(tmp_path, name):
+    shown = np.zeros((80, 60, 3), np.uint8)
+    shown[:40, :30] = 200, 100, 50
+    tag = Image.Exif()
+    tag[0x112] = 8  # a viewer turns it by a quarter to the left
+    Image.fromarray(np.rot90(shown, -1)).save(tmp_path / name, exif=tag)
+    assert np.abs(read_photograph(tmp_path / name).astype(int) - shown)[4:28, 4:12].max() < 5
+    assert read_photograph(tmp_path / name).shape == shown.shape
