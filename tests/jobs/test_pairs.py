@@ -28,6 +28,12 @@ SCENE = "scenes/press_sphere"
 COUNT = 40  # contacts
 
 
+@pytest.fixture
+def single(monkeypatch):
+    """Blocks hold one press, a dozen contacts, and not four: for what asks no more."""
+    monkeypatch.setattr(pairs, "BLOCK", 1)
+
+
 @pytest.fixture(scope="module")
 def scene(request):
     return request.config.rootpath / SCENE
@@ -134,7 +140,7 @@ def test_a_scene_that_touches_nothing_is_given_up():
         wanted(dict.fromkeys(range(21), 0), 40, "here")
 
 
-def test_another_seed_makes_other_contacts(made, scene, tmp_path):
+def test_another_seed_makes_other_contacts(made, scene, tmp_path, single):
     import h5py
 
     other = tmp_path / "other.h5"
@@ -224,14 +230,13 @@ def test_a_block_cut_short_is_made_again(scene, made, interrupted, monkeypatch):
     assert interrupted.read_bytes() == made.read_bytes()
 
 
-def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):
+def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, single):
     out = tmp_path / "pairs.h5"
     full = OSError(errno.ENOSPC, "No space left on device")
-    monkeypatch.setattr(hdf5_writer.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
-    with pytest.raises(TactileError, match="No space left"):
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(TactileError, match="No space left"):
+        patch.setattr(hdf5_writer.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
         make_pairs(scene, 5, 7, out)
     assert not out.exists()
-    monkeypatch.undo()
     make_pairs(scene, 5, 7, out)  # goes on from the blocks that are there
     assert out.exists()
 
@@ -244,7 +249,7 @@ def test_a_slide_to_where_the_sensor_falls_away_stays_finite(request):
     assert all(np.isfinite(row[name]).all() for row in rows for name in ("force", "force_digit", "depth_digit"))
 
 
-def test_a_gel_of_ones_own_is_one_folder(request, scene, tmp_path, monkeypatch):
+def test_a_gel_of_ones_own_is_one_folder(request, scene, tmp_path, monkeypatch, single):
     """As docs/extend.md says: TACTILE_SENSORS names the folder; the example, with a coarser lattice and traction."""
     import h5py
 
