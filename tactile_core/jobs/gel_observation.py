@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import sensors
 from ..files.installed import needing
 from ..sensors.calibration_file import load_calibration
 from .gel import Gel
@@ -15,9 +16,9 @@ _MOST_FORCE, _MOST_MOTION = 100.0, 5e-3  # N, m: beyond what a gel bears and mov
 
 
 def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarray:
-    """Return the indices (rows, columns) int of the nodes nearest to an even grid of markers over the camera's picture:
-    rows from the tip along +x, columns along +z."""
-    camera = load_calibration().camera
+    """Return the indices (rows, columns) int of the nodes nearest to an even grid of markers over the gel's picture (of
+    a BioTac, over the DIGIT's): rows from the tip along +x, columns along +z."""
+    camera = gel._renderer.camera if sensors.is_gel(gel.sensor) else load_calibration().camera
     x = np.linspace(camera.gel_x.min(), camera.gel_x.max(), rows + 2)[1:-1]
     z = np.linspace(camera.gel_z.min(), camera.gel_z.max(), columns + 2)[1:-1]
     places = np.stack(np.meshgrid(x, z, indexing="ij"), -1).reshape(-1, 1, 2)

@@ -51,7 +51,8 @@ class MujocoGel:
         self.model, self.sensor, self.friction, self.preset = model, sensor, friction, preset
         self._geom = _number(model, "geom", geom)
         self._site = _number(model, "site", site)
-        self._gels: dict[int, tuple[Gel, np.ndarray]] = {}  # by geom, and where the indenter's frame is in the geom's
+        # By geom, where the indenter's frame is in the geom's, and the size of the geom that it was made of.
+        self._gels: dict[int, tuple[Gel, np.ndarray, np.ndarray]] = {}
         self._shift = np.zeros(3)  # m, along the gel
         self._ignored: set[int] = set()
         self.gel: Gel | None = None  # the one that pressed last
@@ -69,11 +70,13 @@ class MujocoGel:
             self.gel.reset()
             return self.gel.contact
         body = max(pressing, key=lambda geom: (pressing[geom][1], -geom))
-        if body not in self._gels:
+        size = self.model.geom_size[body]  # which may be another in each episode
+        if body not in self._gels or not np.array_equal(self._gels[body][2], size):
             indenter, offset = indenter_of(self.model, body)
             gel = Gel(self.sensor, indenter, friction=self.friction, preset=self.preset)
-            self._gels[body] = gel, offset
-        gel, offset = self._gels[body]
+            self._gels[body] = gel, offset, size.copy()
+        gel, offset, _ = self._gels[body]
+        gel.friction, gel.preset = self.friction, self.preset
         if gel is not self.gel:
             gel.reset()
             self._shift = np.zeros(3)

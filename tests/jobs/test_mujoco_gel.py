@@ -10,8 +10,11 @@ mujoco = pytest.importorskip("mujoco", reason="the extra [mujoco] is not install
 pytest.importorskip("gymnasium", reason="the extra [mujoco] is not installed")
 
 from tactile_core.errors import TactileError  # noqa: E402
+from tactile_core.geometry.indenters import Sphere  # noqa: E402
+from tactile_core.jobs.gel import Gel  # noqa: E402
 from tactile_core.jobs.gel_observation import marker_nodes, observation_space, observe  # noqa: E402
 from tactile_core.jobs.mujoco_gel import MujocoGel  # noqa: E402
+from tactile_core.sensors.calibration_file import load_calibration  # noqa: E402
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / "mujoco_grasp" / "grasp.py"
 # A gel that lies on its back under a body of 60 g: y into the gel is world -z, x along the finger world x.
@@ -82,6 +85,17 @@ def test_nothing_touches_before_and_after():
     assert not touch(data).patch.any()
 
 
+def test_another_size_or_friction_counts_from_the_next_step():
+    model, data = settled("sphere")
+    touch = MujocoGel(model, "gel", "gel")
+    small = touch(data)
+    model.geom("body").size[0] = 9e-3  # as drawn anew for an episode
+    touch.friction = 0.2
+    wide = touch(data)
+    assert touch.gel.indenter.radius == 9e-3 and touch.gel.friction == 0.2
+    assert wide.patch.sum() > 1.1 * small.patch.sum()
+
+
 def test_names_that_the_model_lacks_are_refused_with_those_it_has():
     model = mujoco.MjModel.from_xml_string(LYING.format(geom=GEOMS["sphere"], vertices=CORNERS))
     with pytest.raises(TactileError, match=r"no geom 'pad'.*floor, gel, body"):
@@ -99,6 +113,9 @@ def test_observations_lie_in_their_space():
     space = observation_space(markers)
     assert space.contains(seen) and set(seen) == {"picture", "force", "markers"}
     assert np.abs(seen["markers"]).max() > 1e-6
+    mini = Gel("gelsight_mini", Sphere(3e-3))
+    places, camera = mini.surface.rest[marker_nodes(mini)], load_calibration(None, "gelsight_mini").camera
+    assert np.ptp(places[..., 0]) == pytest.approx(0.8 * np.ptp(camera.gel_x), rel=0.1)  # over its own picture
     assert observation_space(markers, picture=False).contains(observe(touch.gel, markers, picture=False))
 
 
