@@ -93,7 +93,7 @@ class TACTILE_OT_translate(JobOperator):
         summary = set_style.animate(gel, self._moved, frames, skin.tactile.motion, told)
         if new:
             set_style.take_over(gel, skin)
-        low = view.mark_low_confidence(context.scene, self._found.translation.confidence, frames)
+        low = view.mark_low_confidence(context.scene, skin.name, self._found.translation.confidence, frames)
         view.show(context, [gel, skin])
         pictures.show_result(self, context, gel)
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")

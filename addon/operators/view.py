@@ -219,13 +219,13 @@ def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> 
     scene.frame_set(first)
 
 
-def mark_low_confidence(scene: bpy.types.Scene, confidence: np.ndarray, frames: np.ndarray) -> int:
-    """Mark stretches of frames (T,) whose confidence (T,), 0 to 1, is below 0.5, in place of earlier such marks; return
-    how many stretches there are."""
-    for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARKER)]:
+def mark_low_confidence(scene: bpy.types.Scene, name: str, confidence: np.ndarray, frames: np.ndarray) -> int:
+    """Mark stretches of frames (T,) whose confidence (T,), 0 to 1, is below 0.5, in place of earlier such marks of the
+    skin ``name``, and of an older file's, which name none; return how many stretches there are."""
+    for marker in [each for each in scene.timeline_markers if each.name.startswith((MARKER, f"{name}: {MARKER}"))]:
         scene.timeline_markers.remove(marker)
     edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))
     parts = list(zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1, strict=True))
     for start, end in parts[:MOST_MARKERS]:
-        scene.timeline_markers.new(f"{MARKER} to {frames[end]:g}", frame=int(frames[start]))
+        scene.timeline_markers.new(f"{name}: {MARKER} to {frames[end]:g}", frame=int(frames[start]))
     return len(parts)

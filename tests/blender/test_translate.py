@@ -139,13 +139,15 @@ def test_the_picture_and_height_map_are_those_of_the_library(gel, part, translat
 
 
 def test_low_confidence_is_marked_on_the_timeline(scene, part):
-    confidence = np.array([1, 0.2, 0.3, 1, 1, 0.1])
-    assert part("addon.operators.view").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
+    """A second recording's marks took the place of the first one's."""
+    confidence, mark = np.array([1, 0.2, 0.3, 1, 1, 0.1]), part("addon.operators.view").mark_low_confidence
+    assert mark(scene, "skin", confidence, np.arange(10, 16)) == 2
+    assert mark(scene, "skin.001", confidence[:2], np.arange(2)) == 1
     assert [(m.frame, m.name) for m in scene.timeline_markers] == [
-        (11, "low confidence to 12"), (15, "low confidence to 15"),
+        (11, "skin: low confidence to 12"), (15, "skin: low confidence to 15"), (1, "skin.001: low confidence to 1"),
     ]  # fmt: skip
-    part("addon.operators.view").mark_low_confidence(scene, np.ones(6), np.arange(6))
-    assert not scene.timeline_markers
+    mark(scene, "skin", np.ones(6), np.arange(6))
+    assert [m.frame for m in scene.timeline_markers] == [1]
 
 
 def test_a_gel_in_a_collection_of_the_user_s_is_translated_again(imported, gel):
