@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import itertools
 import logging
@@ -84,6 +85,8 @@ class Gel:
 
     def __repr__(self) -> str:
         return f"<Gel of a {self.sensor}, friction {self.friction:g}, preset {self.preset}, under {self.indenter!r}>"
+
+    __copy__ = copy.deepcopy  # copies move on independently
 
     def reset(self) -> None:
         """Remove the indenter; the next contact does not depend on earlier ones."""
@@ -228,16 +231,14 @@ class Gel:
         try:
             touch, limit = self._touch_and_limit(pose)
         except TactileError:  # it passes the sensor by
-            if force is not None:
-                flags.append("force not reached")
+            flags += ["force not reached"] * (force is not None)
             self._press = None
             return None
         depth = float((pose.apex - touch.apex) @ PUSH)
         if force is None and depth <= 0:
             self._press = None
             return None
-        if began and force is None and depth > _BEGUN_INSIDE:
-            flags.append("began inside")
+        flags += ["began inside"] * (began and force is None and depth > _BEGUN_INSIDE)
         if self._press is None:
             solid = compliance_of(self.sensor)
             self._press = CorrectedPress(solid, self.indenter, touch, limit, self.friction, self._work)
@@ -245,8 +246,7 @@ class Gel:
         try:
             if force is not None:
                 return self._at_force(self._press, touch, force, limit, flags)
-            if depth > limit:
-                flags.append("too deep")
+            flags += ["too deep"] * (depth > limit)
             return self._at_depth(self._press, touch, min(depth, limit))
         except PenetrationError as error:
             raise UnsolvedError(str(error)) from error

@@ -36,7 +36,7 @@ MOST_BELOW = 1.4e-3
 
 
 class Renderer:
-    """Camera pictures of one unit by one preset; the scene and the picture at rest are made once.
+    """Camera pictures of one unit by one preset; the scene and the picture at rest are made once. Keep one per thread.
 
     calibration : the unit's camera and lights, of ``load_calibration``, or their file; None for the unit that ships
     preset : ``fast`` (numpy alone, 8 ms per picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)

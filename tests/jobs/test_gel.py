@@ -1,5 +1,6 @@
 """A fingertip in a simulator's loop: forces, tractions, pictures, memory, and what it makes of bad input."""
 
+import copy
 import threading
 
 import numpy as np
@@ -347,6 +348,18 @@ def test_first_touch_is_looked_for_once_a_line(monkeypatch):
         gel.press(shifted(pose, y=depth))
     assert len(looked) == 1
     assert gel.press(shifted(pose, x=0.1e-3, y=0.3e-3)).depth > 0 and len(looked) == 2  # slid
+
+
+def test_a_copy_moves_on_by_itself():
+    poses = path(gel := Gel("digit", BALL))
+    *_, alone = gel.follow(poses)
+    gel.reset()
+    *_, held = gel.follow(poses[:-3])
+    for copied in (copy.copy(gel), copy.deepcopy(gel)):
+        *_, other = copied.follow(shifted(held.pose, x=-0.1e-3 * k) for k in range(1, 6))
+        assert gel.contact is held and other.force[0] < 0
+    *_, after = gel.follow(poses[-3:])
+    assert same(after, alone)
 
 
 def test_another_indenter_friction_or_preset_counts_from_the_next_step():
