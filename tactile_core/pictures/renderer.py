@@ -69,7 +69,7 @@ class Renderer:
         self.calibration, self.preset = calibration, preset
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
-        self._resting = rest_height_map(self.camera) if rest is None else np.asarray(rest)
+        self._resting = rest_height_map(self.camera) if rest is None else np.array(rest)  # a copy of its own
         resting = self._heights(self._resting, "rest height map")
         self.view = Perspective(self.camera, resting)
         self._spread = CoatingSpread(self.camera, calibration.coating.spread)

@@ -195,6 +195,15 @@ def test_a_background_in_other_units_is_refused(levels, small):
         assert Renderer(small, "fast", background=np.full((*small.camera.shape, 3), kept)).background.max() <= 255
 
 
+def test_a_rest_that_its_caller_then_dents_stays_the_rest(small):
+    heights = rest_height_map(small.camera)
+    renderer, dented = Renderer(small, "fast", rest=heights), heights.copy()
+    dented[30:40, 30:40] += 0.2e-3
+    expected = renderer(dented)
+    heights[30:40, 30:40] += 0.2e-3
+    np.testing.assert_array_equal(renderer(heights), expected)
+
+
 def test_heights_in_millimetres_of_the_other_sign_and_changes_alone_are_refused(small):
     """A dent of half a millimetre, as half a metre: away from the camera nothing else stops it."""
     rest = rest_height_map(small.camera)
