@@ -106,8 +106,9 @@ def terms(most: int) -> Iterator[tuple[int, int]]:
 
 def check_way(picture: np.ndarray, own: np.ndarray) -> None:
     """Raise TactileError for a background that is much more like the unit's own after its colours are exchanged or it
-    is turned. picture, own : (H, W, 3) levels, the background and the unit's own"""
+    is turned or mirrored. picture, own : (H, W, 3) levels, the background and the unit's own"""
     ways = {"as it is": picture, "picture[..., ::-1]": picture[..., ::-1], "picture[::-1, ::-1]": picture[::-1, ::-1]}
+    ways |= {"picture[::-1]": picture[::-1], "picture[:, ::-1]": picture[:, ::-1]}
     alike = {way: _correlation(each, own) for way, each in ways.items()}
     best = max(alike, key=alike.__getitem__)
     if alike[best] > alike["as it is"] + MORE_ALIKE:

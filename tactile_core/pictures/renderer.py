@@ -236,7 +236,7 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
 
 def _given_background(picture: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Return a user's picture (H, W, 3) as float32. Raises TactileError for values that are not levels 0 to 255, and if
-    it is much more like the unit's ``own`` (H, W, 3) with colours exchanged, or turned."""
+    it is much more like the unit's ``own`` (H, W, 3) with colours exchanged, turned or mirrored."""
     levels = camera_array(picture, own.shape, "background")
     least, most = float(levels.min()), float(levels.max())
     shares = np.asarray(picture).dtype.kind == "f" and 0 < most <= 1

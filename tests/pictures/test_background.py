@@ -1,12 +1,14 @@
 """The picture at rest: a photograph of the untouched gel follows the lights that are changed after it was taken."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tactile_core.errors import TactileError
 from tactile_core.pictures.background import read_photograph, resting_picture
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
@@ -84,3 +86,18 @@ def test_a_photograph_is_read_as_viewers_show_it(tmp_path, name):
     Image.fromarray(np.rot90(shown, -1)).save(tmp_path / name, exif=tag)
     assert np.abs(read_photograph(tmp_path / name).astype(int) - shown)[4:28, 4:12].max() < 5
     assert read_photograph(tmp_path / name).shape == shown.shape
+
+
+ALL = slice(None)
+BACK = {  # the way back, and what a picture was turned by
+    "picture[::-1]": (slice(None, None, -1), ALL, ALL), "picture[:, ::-1]": (ALL, slice(None, None, -1), ALL),
+    "picture[..., ::-1]": (ALL, ALL, slice(None, None, -1)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", BACK)
+def test_a_background_that_is_mirrored_or_of_other_colours_is_told_the_way_back(unit, way):
+    picture = at_rest(unit)
+    with pytest.raises(TactileError, match=re.escape(f"1.00 {way})")):
+        Renderer(unit, "fast", background=picture[BACK[way]])
+    np.testing.assert_array_equal(Renderer(unit, "fast", background=picture).background, picture)
