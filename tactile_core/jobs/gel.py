@@ -88,6 +88,9 @@ class Gel:
 
     __copy__ = copy.deepcopy  # copies move on independently
 
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_drawer": None}  # a copy makes its own: Mitsuba's scenes cannot be copied
+
     def reset(self) -> None:
         """Remove the indenter; the next contact does not depend on earlier ones."""
         self._press: CorrectedPress | None = None
@@ -257,9 +260,7 @@ class Gel:
             raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")
         return found
 
-    def _at_force(
-        self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list[str]
-    ) -> FastContact:
+    def _at_force(self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list) -> FastContact:
         """Return the contact at force, N, searched from first touch, or the nearest one that was found.
         limit : m, greatest depth; flags : list, extended if the force is missed"""
         bears, above = float(self._contact.force[1]), None
@@ -271,12 +272,11 @@ class Gel:
         flags.append("force not reached")
         if above is not None:
             return above
-        if self._work.left > 0:
-            for share in _SHALLOWER:
-                try:
-                    return self._at_depth(press, touch, share * limit)
-                except UnsolvedError:
-                    continue
+        for share in _SHALLOWER if self._work.left > 0 else ():
+            try:
+                return self._at_depth(press, touch, share * limit)
+            except UnsolvedError:
+                continue
         flags += ["too large"] * (self._work.left <= 0)
         nearest = press.nearest()
         if nearest is None:

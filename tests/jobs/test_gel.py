@@ -375,3 +375,4 @@ def test_another_indenter_friction_or_preset_counts_from_the_next_step():
     assert gel.press(poses[-2]).slipping == 0 and "jumped" not in gel.press(poses[-1]).flags
     gel.preset = "standard"
     assert gel._renderer.preset == "standard"
+    assert copy.copy(gel)._drawer is None  # Mitsuba's scene cannot be copied
