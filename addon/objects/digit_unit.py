@@ -106,11 +106,17 @@ def _lamp(thing: bpy.types.Object, gel: bpy.types.Object, depsgraph: bpy.types.D
 
 
 def _world(thing: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return an object's matrix to world axes. Blender does not move one that is disabled in views with its parent."""
+    """Return an object's matrix to world axes. Blender does not move one that is disabled in views, by itself or by its
+    collection, with its parent."""
     now, parent = thing.evaluated_get(depsgraph), thing.parent
-    if parent is None or thing.parent_type != "OBJECT" or not thing.hide_viewport or depsgraph.mode == "RENDER":
+    if parent is None or thing.parent_type != "OBJECT" or depsgraph.mode == "RENDER" or _shown(thing, depsgraph):
         return now.matrix_world
     return _world(parent, depsgraph) @ now.matrix_parent_inverse @ now.matrix_basis
+
+
+def _shown(thing: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    layer = depsgraph.view_layer
+    return thing.visible_get(view_layer=layer) or thing.hide_get(view_layer=layer)  # the eye hides what still moves
 
 
 def _lamps(gel, depsgraph, camera: Camera, rendered: set[bpy.types.Object]) -> list[Lamp]:  # noqa: ANN001

@@ -14,7 +14,7 @@ from ...tactile_core.errors import TactileError
 from ..objects import curves, indenter_objects, motion
 from ..settings import properties
 
-PRESSED = "tactile_pressed"  # property of an indenter: its path, m, that its forces were found for
+PRESSED = "tactile_pressed"  # property of an indenter: first frame, and path, m, that its forces were found for
 DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender."}
 DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
 _STRAIGHT = 1e-7  # m and N, off a straight line, taken for float32's rounding
@@ -179,13 +179,16 @@ def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarra
     sensor's frame, and "force" (P,) N. The scene keeps its current frame."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []
+    upright = np.eye(3) if thing.tactile.spec else None
     try:
         for frame in frames:
             scene.frame_set(int(frame // 1), subframe=float(frame % 1))
             relative = indenter_objects.world_axes(thing, sensor)
-            if thing.tactile.spec and not np.allclose(relative, np.eye(3), atol=1e-4):
-                found, advice = f"turned or scaled on frame {frame:g}", "Remove the keys of its rotation and scale"
-                raise TactileError(thing.name, found, "an upright body on every frame", advice)
+            upright = relative if upright is None else upright
+            if not np.allclose(relative, upright, atol=1e-4):
+                found = f"turned or scaled against the sensor on frame {frame:g}"
+                advice = "Remove keys that turn or scale it or the sensor, or parent it to the sensor"
+                raise TactileError(thing.name, found, "a body that keeps its axes", advice)
             foot = indenter_objects.foot_of(thing, relative, context.evaluated_depsgraph_get())
             apex.append(indenter_objects.place_of(thing, sensor, foot))
             force.append(thing.tactile.force)

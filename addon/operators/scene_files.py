@@ -112,9 +112,10 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
             advice = "Simulate first, or press by force"
             raise TactileError(thing.name, "no forces yet", "what a scene file holds of a press", advice)
         found = scene_bridge.authored(context)
-        if found.apexes is not None and not _same_path(found.apexes, thing.get(scene_bridge.PRESSED)):
-            advice = "Simulate again, or press by force"
-            raise TactileError(thing.name, "moved since its forces were found", "forces of this motion", advice)
+        pressed = thing.get(scene_bridge.PRESSED)
+        if found.apexes is not None and not _same_path(found.apexes, context.scene.frame_start, pressed):
+            lacking = "moved since its forces were found, or they end before"
+            raise TactileError(thing.name, lacking, "forces of this motion", "Simulate again, or press by force")
         write_scene(path.parent, found.scene, found.meshes)
         self.report({"INFO"}, f"{path}: {len(found.scene.recording.points)} points")
 
@@ -141,10 +142,14 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
         self.report({"INFO"}, path + "; other lamps and bodies are left out" * bool(shown.around))
 
 
-def _same_path(apexes: np.ndarray, pressed: Sequence[float] | None) -> bool:
-    """Return true if an indenter's path is the one that its forces were found for, or if that is not known.
-    apexes : (P, 3) m, the path; pressed : 3 P numbers, m, the other one; None in an older file"""
-    return pressed is None or (len(pressed) == apexes.size and np.allclose(pressed, apexes.ravel(), atol=1e-6))
+def _same_path(apexes: np.ndarray, start: int, pressed: Sequence[float] | None) -> bool:
+    """Return true if an indenter's path is in the one that its forces were found for, or if that is not known.
+    apexes : (P, 3) m, the path from frame ``start`` on; pressed : as ``PRESSED``, None in an older file"""
+    if pressed is None:
+        return True
+    skipped = start - int(pressed[0])
+    same = np.reshape(pressed[1:], (-1, 3))[max(skipped, 0) :][: len(apexes)]
+    return skipped >= 0 and len(same) == len(apexes) and np.allclose(same, apexes, atol=1e-6)
 
 
 def _has_force(thing: bpy.types.Object) -> bool:

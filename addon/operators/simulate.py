@@ -169,8 +169,10 @@ class TACTILE_OT_simulate(JobOperator):
         thing = properties.found_again(context.scene, *self._thing, "the indenter that was simulated")
         result = read(self._folder.path)
         summary = bake(context, thing, result, self._frames, self._rate)
-        if self._apexes is not None:
-            thing[scene_bridge.PRESSED] = self._apexes.ravel().tolist()
+        if self._apexes is None:
+            thing.pop(scene_bridge.PRESSED, None)
+        else:
+            thing[scene_bridge.PRESSED] = [self._frames[0], *self._apexes.ravel().tolist()]
         try:
             self._keep(context, thing)
         except OSError as error:  # what it baked is kept

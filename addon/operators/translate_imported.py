@@ -44,12 +44,12 @@ class TACTILE_OT_translate(JobOperator):
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin, skin.data)  # an override's mesh is linked
-        beside = properties.home_of(skin).objects
-        motion.check_rest(*(thing for thing in beside if thing.tactile.role in properties.OF_ROLE))
         about = skin.tactile
         with shown(context) as progress:
             own = recording_data.translator_of(about, bpy.path.abspath(about.recording)).target
             self._target = self.to.lower() if self.properties.is_property_set("to") else own
+            gel = _gel_beside(context.scene, skin, self._target)
+            motion.check_rest(*filter(None, (skin, gel)))
             ball = ball_radius(f"{BALL}{about.ball:g}") if about.ball else None
             solved = self._target != own or ball is not None
             if about.two and solved:
@@ -83,7 +83,8 @@ class TACTILE_OT_translate(JobOperator):
                 self.report({"WARNING"}, words)
         skin = properties.found_again(context.scene, *self._skin, "the skin that was translated")
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
-        gel, new = _gel_beside(context.scene, skin, self._target)
+        old = _gel_beside(context.scene, skin, self._target)
+        gel = old or digit_objects.add_gel(properties.home_of(skin), skin.tactile.per_metre, skin, self._target)
         if skin.tactile.known and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
             play(skin, self._found, frames)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
@@ -91,7 +92,7 @@ class TACTILE_OT_translate(JobOperator):
         told = {name: values[name] for name in ("force", "confidence", "explained")}
         told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
         summary = set_style.animate(gel, self._moved, frames, skin.tactile.motion, told)
-        if new:
+        if old is None:
             set_style.take_over(gel, skin)
         low = view.mark_low_confidence(context.scene, skin.name, self._found.translation.confidence, frames)
         view.show(context, [gel, skin])
@@ -99,20 +100,20 @@ class TACTILE_OT_translate(JobOperator):
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 
-def _gel_beside(scene: bpy.types.Scene, skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:
-    """Return the gel of the kind ``sensor`` beside a skin, and true if it was missing and has been added.
+def _gel_beside(scene: bpy.types.Scene, skin: bpy.types.Object, sensor: str) -> bpy.types.Object | None:
+    """Return the gel of the kind ``sensor`` beside a skin, None if there is none.
 
-    An old gel keeps its LEDs, coating and camera as the user set them; of several, as of a copied pair, it is the one
-    nearest to where this skin's would be added. One that was moved to another collection is known by its forces.
+    It keeps its LEDs, coating and camera as the user set them; of several, as of a copied pair, it is the one nearest
+    to where this skin's would be added. One that was moved to a collection without a skin is known by its forces.
     """
-    group = properties.home_of(skin)
     gels = [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]
     gels = [thing for thing in gels if properties.sensor_name(thing) == sensor]
     place = skin.location + Vector((0.0, digit_objects.BESIDE * skin.tactile.per_metre, 0.0))
-    found = [thing for thing in gels if thing in group.objects.values()] or [
-        thing for thing in gels if "force" in thing and _forces(thing) == _forces(skin)]  # fmt: skip
-    same = min(found, key=lambda thing: (thing.location - place).length, default=None)
-    return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor), same is None
+    beside = properties.home_of(skin).objects.values()
+    alone = [gel for gel in gels if all(thing.tactile.role != "BIOTAC" for thing in properties.home_of(gel).objects)]
+    found = [gel for gel in gels if gel in beside] or [
+        gel for gel in alone if "force" in gel and _forces(gel) == _forces(skin)]  # fmt: skip
+    return min(found, key=lambda thing: (thing.location - place).length, default=None)
 
 
 def _forces(sensor: bpy.types.Object) -> list[list[float]]:

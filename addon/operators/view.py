@@ -63,7 +63,8 @@ def use_millimetres(operator: bpy.types.Operator, scene: bpy.types.Scene) -> Non
     """Make a scene's unit a millimetre. The operator says so if the scene holds anything else, whose sizes change."""
     if not is_new(scene) and not np.isclose(scene.unit_settings.scale_length, 1e-3):
         words = "The scene's unit is a millimetre now, of its other objects too: what was 2 m long is 2 mm"
-        operator.report({"WARNING"}, f"{words}. Use a scene for each, or set Scene in Millimetres off")
+        advice = "Use a scene for each, or import a recording with Scene in Millimetres off"
+        operator.report({"WARNING"}, f"{words}. {advice}")
     axes.use_millimetres(scene)
 
 
@@ -222,6 +223,7 @@ def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> 
 def mark_low_confidence(scene: bpy.types.Scene, name: str, confidence: np.ndarray, frames: np.ndarray) -> int:
     """Mark stretches of frames (T,) whose confidence (T,), 0 to 1, is below 0.5, in place of earlier such marks of the
     skin ``name``, and of an older file's, which name none; return how many stretches there are."""
+    name = name.encode()[:30].decode(errors="ignore")  # of 63 bytes that a marker's name may have
     for marker in [each for each in scene.timeline_markers if each.name.startswith((MARKER, f"{name}: {MARKER}"))]:
         scene.timeline_markers.remove(marker)
     edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))

@@ -147,8 +147,10 @@ def test_a_body_that_turns_later_is_refused(gel_alone, tmp_path):
         box.rotation_euler.z = angle
         box.keyframe_insert("rotation_euler", frame=frame)
     gel_alone.frame_set(1)
-    with pytest.raises(RuntimeError, match=r"box: turned or scaled on frame [2-5]; expected an upright body"):
-        _export(tmp_path)
+    for spec in (box.tactile.spec, ""):  # "": with the mesh as it is
+        box.tactile.spec = spec
+        with pytest.raises(RuntimeError, match=r"box: turned or scaled against the sensor on frame [2-5];"):
+            _export(tmp_path)
 
 
 def test_a_unit_that_changes_other_objects_is_said(scene, capfd):
@@ -374,16 +376,22 @@ def test_heights_have_no_forces_before_they_are_simulated(sensors, tmp_path):
 def test_forces_of_an_earlier_motion_are_not_exported(gel_alone, tmp_path):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object
-    gel_alone.frame_start, gel_alone.frame_end = 1, 2
-    for frame, depth in ((1, 0.0), (2, 0.3)):
+    gel_alone.frame_start, gel_alone.frame_end = 1, 3
+    for frame, depth in ((1, 0.0), (3, 0.3)):
         bpy.ops.tactile.snap_to_gel(depth=depth)
         ball.keyframe_insert("location", frame=frame)
     bpy.ops.tactile.simulate()
     ball.parent.location.x += 90
     _export(tmp_path)  # the same press elsewhere
-    gel_alone.frame_set(2)
+    gel_alone.frame_start = 2
+    _export(tmp_path)  # a part of it
+    gel_alone.frame_end = 4
+    with pytest.raises(RuntimeError, match=r"sphere: .*or they end before"):
+        _export(tmp_path)
+    gel_alone.frame_end = 3
+    gel_alone.frame_set(3)
     bpy.ops.tactile.snap_to_gel(depth=0.6)
-    ball.keyframe_insert("location", frame=2)
+    ball.keyframe_insert("location", frame=3)
     with pytest.raises(RuntimeError, match=r"sphere: moved since its forces were found.* Simulate again"):
         _export(tmp_path)
 

@@ -298,11 +298,17 @@ def test_what_a_hidden_collection_holds_is_off(shown, gel, by):
     assert not shown().around and shown().unit.leds[0].radiance == 0 < shown().unit.leds[1].radiance
 
 
-def test_parts_that_are_disabled_in_views_move_with_the_gel(gel, drawn):
+@pytest.mark.parametrize("by_collection", [False, True])
+def test_parts_that_are_disabled_in_views_move_with_the_gel(gel, drawn, by_collection):
     """Blender leaves them where they were: the panel's picture was lit from there."""
-    before = drawn()
+    before, parts = drawn(), bpy.data.collections.new("parts")
+    parts.hide_viewport = by_collection
+    bpy.context.scene.collection.children.link(parts)
     for thing in gel.children_recursive:
-        thing.hide_viewport = True
+        thing.hide_viewport = not by_collection
+        if by_collection:
+            thing.users_collection[0].objects.unlink(thing)
+            parts.objects.link(thing)
     gel.location, gel.rotation_euler.z = (7.0, -3.0, 2.0), 0.4
     assert np.abs(drawn() - before).max() <= 1  # a level: places are float32
 

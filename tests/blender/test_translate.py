@@ -160,9 +160,20 @@ def test_a_gel_in_a_collection_of_the_user_s_is_translated_again(imported, gel):
     bpy.context.view_layer.objects.active, skin.tactile.tare = skin, "0:20"
     bpy.ops.tactile.translate()
     assert [*gel["force"]] == [*skin["force"]]
+    bpy.context.view_layer.objects.active = gel
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match=r"in Edit Mode.* Press Tab"):
+        bpy.ops.tactile.translate()
+    bpy.ops.object.mode_set(mode="OBJECT")
     imported(frames="40:50")  # another recording has a gel of its own
     bpy.ops.tactile.translate()
     assert sum(thing.tactile.role == "DIGIT" for thing in scene.objects) == 2
+
+
+def test_the_same_recording_twice_has_two_gels(imported, gel):
+    imported()
+    bpy.ops.tactile.translate()
+    assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 2
 
 
 def test_translating_again_replaces_the_gel(gel):

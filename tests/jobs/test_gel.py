@@ -376,3 +376,4 @@ def test_another_indenter_friction_or_preset_counts_from_the_next_step():
     gel.preset = "standard"
     assert gel._renderer.preset == "standard"
     assert copy.copy(gel)._drawer is None  # Mitsuba's scene cannot be copied
+    assert copy.copy(gel)._press.compliance is gel._press.compliance  # 200 MB

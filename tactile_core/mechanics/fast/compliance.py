@@ -74,6 +74,9 @@ class Compliance:
     feet: int = 0
     facing: int = 0
 
+    def __deepcopy__(self, memo: dict) -> Compliance:
+        return self  # hundreds of megabytes that nobody writes to
+
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return how ``move`` answers for each touchable node: the number i (m,) of the node whose rows apply, and true
