@@ -25,9 +25,9 @@ LOOKED_AT, CALMER, APART = 2000, 0.3, 3
 QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
 RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
 RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
-# Counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts per hour = 0.024/s).
+# Counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts per hour = 0.024/s). After a contact they
+# differ by up to 20 (plate 15330): the skin, which creeps, is dented still.
 LEVEL, LEVEL_RATE = 3.0, 0.1
-LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
 PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
 TRACKED = 60.0  # s; in longer recordings the level follows drift, which may exceed a press (assumed)
 TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
@@ -175,12 +175,11 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
     anchor = _anchor(windows, calm, kind, duration)
     apart = np.abs(windows.middle - windows.middle[anchor])
     off = windows.largest(lambda mean: np.abs(mean - mean[anchor]))
+    agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
     if windows.pdc is None:
-        agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
         return agree & _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
-    pressure = windows.pdc - windows.pdc[anchor]
-    agree = possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
-    agree &= _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
+    agree &= windows.pdc - windows.pdc[anchor] < QUIET_PDC + PDC_RATE * apart
+    agree &= _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
     return agree & _tracked(windows.pdc[None], 1, windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
 
 
@@ -217,7 +216,7 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
     calm : (n,) int, indices of the windows to choose from; duration : s, of the recording"""
     if windows.pdc is not None:
         low = windows.pdc[calm]
-        calm = calm[low <= low.min() + 0.5 * QUIET_PDC]
+        calm = calm[low <= low.min() + QUIET_PDC]
     if kind != "raw":
         return int(calm[np.argmin(windows.largest(np.abs)[calm])])
     early = windows.middle[calm] <= NEAR_END + 0.5 * WINDOW

@@ -49,6 +49,16 @@ def test_true_changes_come_back_with_tare_and_drift(kind, pdc, press):
     json.dumps(signals.report)
 
 
+def test_rest_is_the_start_s_where_the_skin_creeps_after_a_contact(make):
+    """A real finger's pressure falls by 1.7 counts below that of its first 9 s, which read .35 N."""
+    press = make(slope=0)
+    after = np.arange(700) > np.flatnonzero(press.contact).max()
+    press.electrodes = np.rint(press.electrodes + 18 * after[:, None])
+    press.pdc = press.pdc - 1.7 * after
+    signals = recordings.prepare(make_recording(press))
+    assert signals.quiet[20:150].all() and not signals.quiet[after].any() and error_of(signals, press) < NOISE
+
+
 @pytest.mark.parametrize("part", [slice(0, 400), slice(300, 700)], ids=["rest at the start", "rest at the end"])
 @pytest.mark.parametrize("pdc", [True, False])
 def test_a_quiet_part_is_found_wherever_it_lies(part, pdc, make):
