@@ -8,6 +8,7 @@ import itertools
 import logging
 import os
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -234,14 +235,16 @@ class Gel:
         try:
             touch, limit = self._touch_and_limit(pose)
         except TactileError:  # it passes the sensor by
-            flags += ["force not reached"] * (force is not None)
+            if force is not None:
+                flags.append("force not reached")
             self._press = None
             return None
         depth = float((pose.apex - touch.apex) @ PUSH)
         if force is None and depth <= 0:
             self._press = None
             return None
-        flags += ["began inside"] * (began and force is None and depth > _BEGUN_INSIDE)
+        if began and force is None and depth > _BEGUN_INSIDE:
+            flags.append("began inside")
         if self._press is None:
             solid = compliance_of(self.sensor)
             self._press = CorrectedPress(solid, self.indenter, touch, limit, self.friction, self._work)
@@ -249,7 +252,8 @@ class Gel:
         try:
             if force is not None:
                 return self._at_force(self._press, touch, force, limit, flags)
-            flags += ["too deep"] * (depth > limit)
+            if depth > limit:
+                flags.append("too deep")
             return self._at_depth(self._press, touch, min(depth, limit))
         except PenetrationError as error:
             raise UnsolvedError(str(error)) from error
@@ -273,11 +277,10 @@ class Gel:
         if above is not None:
             return above
         for share in _SHALLOWER if self._work.left > 0 else ():
-            try:
+            with suppress(UnsolvedError):
                 return self._at_depth(press, touch, share * limit)
-            except UnsolvedError:
-                continue
-        flags += ["too large"] * (self._work.left <= 0)
+        if self._work.left <= 0:
+            flags.append("too large")
         nearest = press.nearest()
         if nearest is None:
             raise UnsolvedError(f"no contact at {force:g} N")
