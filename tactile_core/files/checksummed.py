@@ -22,12 +22,11 @@ MAGIC = b"tactile-sealed-1 sha256 "
 _DIGITS = 64
 
 
-def write_checksum(path: Path, rows: int | None = None) -> str:
-    """Write the SHA-256 of a closed file and, if given, its number of rows into its user block; return the SHA-256."""
-    digest = _digest(path, rows)
+def write_checksum(path: Path, rows: int | None = None) -> None:
+    """Write the SHA-256 of a closed file and, if given, its number of rows into its user block."""
+    line = _line(_digest(path, rows), rows)
     with open(path, "rb+") as file:
-        file.write(_line(digest, rows))
-    return digest
+        file.write(line)
 
 
 def verified_checksum(path: Path) -> str | None:

@@ -9,7 +9,7 @@ import os
 import sys
 import threading
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -70,23 +70,16 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
     with contextlib.ExitStack() as stack:
         with bounded_memory(MAX_OPENING):
             file = stack.enter_context(h5py.File(path, "r"))
-            _visit(file.id.links, path, _check_link)
-            _visit(file, path, lambda path, name, item: packed.extend(_check(path, name, item)))
+            try:
+                if wrong := file.id.links.visit(functools.partial(_check_link, path), info=True):
+                    raise wrong
+                file.visititems(lambda name, item: packed.extend(_check(path, name, item)))
+            except (RuntimeError, MemoryError) as error:  # what the library says of what it cannot read
+                expected = f"a whole file, opened in {MAX_OPENING // 2**20} MB"
+                raise _refused(path, "its groups", str(error), expected) from error
         for name, data, size, filters in packed:  # what unpacks may take more memory than opening does
             data.id.chunk_iter(functools.partial(_check_chunk, path, name, data, size=size, filters=filters))
         yield file
-
-
-def _visit(place: h5py.File | h5py.h5g.LinkProxy, path: str | os.PathLike, check: Callable) -> None:
-    """Call check(path, name, item) for all objects of a file, or all links; raise the first error that it returns."""
-    links = {} if hasattr(place, "visititems") else {"info": True}
-    visit = place.visit if links else place.visititems
-    try:
-        wrong = visit(lambda name, item: check(path, name, item), **links)
-    except (RuntimeError, MemoryError) as error:  # what the library says of what it cannot read
-        raise _refused(path, "its groups", str(error), f"a whole file, opened in {MAX_OPENING // 2**20} MB") from error
-    if wrong is not None:
-        raise wrong
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
@@ -112,7 +105,8 @@ def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
 
 
 def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:
-    """Return the error of a link to another file or too deep, before the library follows it; None for a good one."""
+    """Return the error of a link to another file or too deep, before the library follows it (which cannot pass on what
+    is raised here); None for a good one."""
     import h5py
 
     if name.count(b"/") >= MAX_DEPTH:

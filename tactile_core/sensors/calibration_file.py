@@ -74,8 +74,7 @@ SHIPPED = calibration_path(Camera.sensor)
 
 @functools.cache
 def _shipped(sensor: str) -> Calibration:
-    file = calibration_path(sensor)
-    return load_calibration(file, sensor)
+    return load_calibration(calibration_path(sensor), sensor)
 
 
 @dataclasses.dataclass(frozen=True)

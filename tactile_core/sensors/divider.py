@@ -36,20 +36,16 @@ def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray
 
 def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
     """Convert change (..., 19) counts of a unit that rests at rest (..., 19) counts to that of one that rests at ``to``
-    (19,). A unit at 3,500 counts responds with 0.7 times the change of one at 3,300, a unit at 2,800 with 1.5 times."""
-    return _converted(change, rest, to)
+    (19,); the films' impedances grow alike. A unit at 3,500 counts responds with 0.7 times the change of one at 3,300,
+    a unit at 2,800 with 1.5 times."""
+    rest, to = np.clip(rest, *RESTS), np.clip(to, *RESTS)
+    return of_films(_film(rest + change) / _film(rest), to) - to
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) -> np.ndarray:
     """Convert change (..., 19) counts of a unit that rests at ``of`` (19,) counts to that of a unit at ``rest`` (19,):
     the inverse of ``typical``."""
-    return _converted(change, of, rest)
-
-
-def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarray:
-    """Convert change of a unit that rests at rest counts to that of one at ``to``; the films' impedances grow alike."""
-    rest, to = np.clip(rest, *RESTS), np.clip(to, *RESTS)
-    return of_films(_film(rest + change) / _film(rest), to) - to
+    return typical(change, of, rest)
 
 
 def _film(counts: np.ndarray | float) -> np.ndarray:

@@ -18,21 +18,8 @@ from typing import Any, TypeVar
 from ..errors import TactileError
 from ..files.outside import read_toml_text
 
-# Decimal places between a unit and SI; degrees become radians.
-_UNITS = {
-    "mm": -3,
-    "um": -6,
-    "per_mm": 3,
-    "mpa": 6,
-    "pa": 0,
-    "ohm": 0,
-    "hz": 0,
-    "px": 0,
-    "s_per_m": 0,
-    "pa_per_count": 0,
-    "counts": 0,
-    "deg": 0,
-}
+_SHIFTS = {"mm": -3, "um": -6, "per_mm": 3, "mpa": 6}  # decimal places between a unit and SI
+_AS_THEY_ARE = ("pa", "ohm", "hz", "px", "s_per_m", "pa_per_count", "counts", "deg")  # but that degrees become radians
 _OTHERS = ("m", "cm", "in", "kpa", "gpa", "bar", "kohm", "khz", "s", "ms", "rad", "n", "v", "mv")  # units often written
 LARGEST_MM, LEAST_MM = 200, 0.05  # of a fingertip: outside, another unit is meant (assumed)
 MOST_NODES = 300  # along a line of a lattice: a compliance of 90,000 nodes fits no memory
@@ -135,7 +122,7 @@ def check_names(where: str, content: dict[str, Any], names: tuple[str, ...]) -> 
 
 
 def _without_unit(name: str) -> str:
-    for unit in sorted((*_UNITS, *_OTHERS), key=len, reverse=True):
+    for unit in sorted((*_SHIFTS, *_AS_THEY_ARE, *_OTHERS), key=len, reverse=True):
         if name.endswith(f"_{unit}"):
             return name.removesuffix(f"_{unit}")
     return name
@@ -179,4 +166,4 @@ def _number(kind: type[float] | type[int], value: Any, where: str, meta: Mapping
         raise TactileError(where, f"{value!s:.80}", " ".join(words).strip())
     if kind is int:
         return int(value)
-    return math.radians(value) if unit == "deg" else float(Decimal(value).scaleb(_UNITS.get(unit, 0)))
+    return math.radians(value) if unit == "deg" else float(Decimal(value).scaleb(_SHIFTS.get(unit, 0)))

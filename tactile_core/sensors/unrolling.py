@@ -19,12 +19,9 @@ def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corners = nodes[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
     summed = [np.bincount(faces.ravel(), np.repeat(area[:, k], 3), minlength=len(nodes)) for k in range(3)]
-    return _unit(np.stack(summed, -1))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(length > 0, length, 1)
+    normals = np.stack(summed, -1)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    return normals / np.where(length > 0, length, 1)
 
 
 @functools.cache
