@@ -120,7 +120,7 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
     of = f"{len(heights)} fields"
     drawn = {name: changes(renderer, heights) for name, renderer in renderers.items()}
-    converged, full = zip(*converge(unit, heights, variant, truth, seed=0), strict=True)
+    converged, full = zip(*converge(unit, heights, truth, seed=0), strict=True)
     for name, change in drawn.items():
         yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
                   baseline=rms(converged), of=of)  # fmt: skip
@@ -136,12 +136,12 @@ def changes(renderer: Renderer, heights: Iterable[np.ndarray]) -> list[np.ndarra
 
 
 def converge(
-    unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int
+    unit: Calibration, heights: list[np.ndarray], truth: Preset, seed: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield, for each of heights (H, W) m, the picture's change from rest, levels (H, W, 3), twice: by direct light
-    alone, and by the full model. variant : of Mitsuba; truth : preset of the full model; seed : of its samples"""
+    alone, and by the full model. truth : preset of the full model; seed : of its samples"""
     rest = of_unit(rest_height_map(unit.camera), unit)
-    light, levels = MatteLight(unit, truth, variant, rest, seed), spread_in_levels(unit)
+    light, levels = MatteLight(unit, truth, rest, seed), spread_in_levels(unit)
     resting, seen = light.direct(rest)
     whole = light.completed(rest, resting, seen)
     for number, height in enumerate(heights, 1):

@@ -84,7 +84,7 @@ class Renderer:
             if self.variant == LLVM:
                 self._light = GelLight(calibration, chosen, resting, seed, surroundings)
             else:
-                self._light = MatteLight(calibration, chosen, self.variant, resting, seed)
+                self._light = MatteLight(calibration, chosen, resting, seed)
         if surroundings and self.variant != LLVM:
             found = f"{len(surroundings.lamps)} more lamps and {len(surroundings.occluders)} bodies in the light's way"
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")

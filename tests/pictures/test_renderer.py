@@ -225,7 +225,7 @@ def test_memory_stays_flat(any_variant, small, press):
     resource = pytest.importorskip("resource", reason="the system counts no memory for a process")
     del resource
     unit = small.at_size(30, 40)
-    light = MatteLight(unit, PRESETS["standard"], any_variant, rest_height_map(unit.camera), 0)
+    light = MatteLight(unit, PRESETS["standard"], rest_height_map(unit.camera), 0)
     height = press.on(unit.camera)
     for _ in range(50):
         light.radiance(height)

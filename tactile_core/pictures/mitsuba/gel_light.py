@@ -12,7 +12,7 @@ from ...sensors.calibration import Calibration
 from ..coating_spread import evened
 from ..perspective import lookup, slopes
 from ..presets import Preset
-from .gel_mesh import MM, GelMesh, check_mesh, mend
+from .gel_mesh import MM, GelMesh, mend
 from .gel_scene import NOTHING, Surroundings, change_numbers, gel_shape, lamps, plugin_names, walls
 from .led_integrator import DIRECTIONS, bounced, direct, mirrored, narrow_lobe
 from .variant import LLVM, activate
@@ -115,10 +115,8 @@ class GelLight:
         """Yield ``radiance`` (H, W, LED) of a height_map (H, W) m, once; by traced paths the mean so far after each
         pass."""
         height = np.asarray(height_map, np.float32)
-        vertices = self._mesh.vertices(height)
-        check_mesh(vertices, self._mesh.faces, self._mesh.count)
         mi = activate(LLVM)
-        self._values["gel.vertex_positions"] = vertices.ravel()
+        self._values["gel.vertex_positions"] = self._mesh.vertices(height).ravel()
         self._values.update()
         if self.preset.paths:
             # Mitsuba's own normals are sums in an order that varies; a second update leaves ours.

@@ -42,7 +42,10 @@ class GelMesh:
         self.count = len(along) * len(across)
 
     def vertices(self, height: np.ndarray) -> np.ndarray:
-        """Return the vertices (n, 3) float32, mesh coordinates, of a gel of ``height`` (H, W) m."""
+        """Return the vertices (n, 3) float32, mesh coordinates, of a gel of ``height`` (H, W) m.
+        Raises TactileError for heights that are not finite, on which Mitsuba would crash."""
+        if not np.isfinite(height).all():
+            raise TactileError("gel mesh, vertices", "values that are not finite", "finite numbers")
         self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
         return self._plan.reshape(-1, 3).copy()
 
@@ -54,11 +57,8 @@ class GelMesh:
         return found.reshape(-1, 3).astype(np.float32)
 
     def shape(self, mi: Any, height: np.ndarray, *, smooth: bool = False) -> Any:
-        """Return the gel of height (H, W) m as a mesh of Mitsuba's module ``mi``; smooth : true gives it normals.
-        Raises TactileError for heights that are not finite."""
-        vertices = self.vertices(height)
-        check_mesh(vertices, self.faces, self.count)
-        return triangle_mesh(mi, "gel", vertices, self.faces, smooth=smooth)
+        """Return the gel of height (H, W) m as a mesh of Mitsuba's module ``mi``; smooth : true gives it normals."""
+        return triangle_mesh(mi, "gel", self.vertices(height), self.faces, smooth=smooth)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lowest and the highest corner (3,) of the mesh at height zero, mesh coordinates."""
@@ -99,17 +99,3 @@ def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
     for row, column in np.argwhere(missed):
         for values in maps:
             values[row, column] = values[row, column - 1 if column else 1]
-
-
-def check_mesh(vertices: np.ndarray, faces: np.ndarray, count: int) -> None:
-    """Raise TactileError for a mesh on which Mitsuba would crash or leave holes: with a number of vertices (n, 3) other
-    than ``count``, that of the scene, with values that are not finite, or with faces (m, 3) of missing vertices."""
-    if vertices.shape != (count, 3):
-        raise TactileError("gel mesh, vertices", f"shape {vertices.shape}", f"({count}, 3)")
-    if not np.isfinite(vertices).all():
-        raise TactileError("gel mesh, vertices", "values that are not finite", "finite numbers")
-    if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
-        raise TactileError("gel mesh, faces", f"shape {faces.shape}", "(faces, 3)")
-    if faces.min() < 0 or faces.max() >= count:
-        found = f"vertex {faces.max() if faces.max() >= count else faces.min()}"
-        raise TactileError("gel mesh, faces", found, f"indices 0 to {count - 1}")

@@ -19,7 +19,7 @@ from ..perspective import lookup, map_lookup, slopes
 from ..presets import Gather, Preset
 from .gel_light import ASIDE
 from .gel_mesh import MARGIN, GelMesh
-from .tracer import make_tracer
+from .tracer import Tracer
 from .window import through_window
 
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))  # of a sunflower's seeds: even over a disc for any number of them
@@ -30,11 +30,11 @@ _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 
 class MatteLight:
     """Radiance of a gel with a matte coating by one of Mitsuba's presets without LLVM; arguments are not checked.
-    variant : llvm_ad_rgb or scalar_rgb; rest : (H, W) m, heights to start with; seed : of the light points"""
+    rest : (H, W) m, heights to start with; seed : of the light points"""
 
-    def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
+    def __init__(self, unit: Calibration, preset: Preset, rest: np.ndarray, seed: int) -> None:
         self.unit, self.preset = unit, preset
-        self._tracer = make_tracer(GelMesh(unit.camera, preset.spacing, square=True), rest, variant)
+        self._tracer = Tracer(GelMesh(unit.camera, preset.spacing, square=True), rest)
         self._start = np.random.default_rng(seed).random(4)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:

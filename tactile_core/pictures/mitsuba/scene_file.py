@@ -29,7 +29,7 @@ from ...sensors.camera import COLOURS, Camera
 from ..background import by_led, raised_light
 from ..perspective import Perspective
 from ..presets import SPACING
-from .gel_mesh import MM, GelMesh, check_mesh
+from .gel_mesh import MM, GelMesh
 from .gel_scene import lamps, material, walls
 
 VERSION = "3.0.0"  # of the scene format
@@ -55,9 +55,8 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
     appear whole or not at all. Raises TactileError for another ending than .xml and heights that are not finite."""
     path, shape, eye = scene_files(path)
     mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
-    check_mesh(mesh.vertices(height_map), mesh.faces, mesh.count)
-    square = square_pixels(unit.camera)
     atomic.write_bytes(shape, _ply(mesh, height_map))
+    square = square_pixels(unit.camera)
     view = dataclasses.replace(unit, camera=square)
     rows = np.rint((np.arange(square.height) + 0.5) * unit.camera.height / square.height - 0.5).astype(int)
     seen = Perspective(unit.camera, height_map)(height_map)[rows]
