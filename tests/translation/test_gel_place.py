@@ -15,14 +15,28 @@ def gel():
     return sensors.digit_surface()
 
 
+WIDTH = 1.5e-3  # m, of a Gaussian dent
+
+
+def away(gel):
+    return np.linalg.norm(gel.rest[:, [0, 2]] - [-8e-3, 1e-3], axis=1)
+
+
 def dent(gel, depth):
-    away = np.linalg.norm(gel.rest[:, [0, 2]] - [-8e-3, 1e-3], axis=1)
     moved = np.zeros((1, *gel.rest.shape))
-    moved[0, :, 1] = depth * np.exp(-0.5 * (away / 1.5e-3) ** 2)
+    moved[0, :, 1] = depth * np.exp(-0.5 * (away(gel) / WIDTH) ** 2)
     return moved
 
 
-@pytest.mark.parametrize(("depth", "touched"), [(0.9, False), (1.2, True), (20, True)])
+def test_the_patch_of_a_dent_is_where_it_bends_inward(gel):
+    """A Gaussian dent bends inward within sqrt(2) of its width from its middle: its Laplacian changes sign there."""
+    patch, radius = gel_place.contact_patch(dent(gel, 0.4e-3), gel)[0], np.sqrt(2) * WIDTH
+    cell = 0.35e-3  # between nodes: the edge is known no better, and the smoothing widens it by less
+    assert patch[away(gel) < radius - 1.5 * cell].all()
+    assert not patch[away(gel) > radius + 1.5 * cell].any()
+
+
+@pytest.mark.parametrize(("depth", "touched"), [(0, False), (0.9, False), (1.2, True)])
 def test_a_dent_is_a_contact_from_an_absolute_depth_on(gel, depth, touched):
     patch = gel_place.contact_patch(dent(gel, depth * gel_place.FLOOR), gel)
     assert patch.any() == touched

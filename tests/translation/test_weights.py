@@ -5,8 +5,6 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tactile_core.errors import TactileError
 from tactile_core.translation import weights
@@ -89,22 +87,6 @@ def test_damaged_files_are_refused(data, message):
     with pytest.raises(TactileError, match=message) as caught:
         weights.from_safetensors(data, "net.safetensors")
     assert "net.safetensors" in str(caught.value)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.integers(0, 10_000), st.integers(1, 255), st.booleans())
-def test_any_damage_is_a_tactile_error_or_an_array_of_the_same_layout(position, change, cut):
-    data = bytearray(weights.to_safetensors(TENSORS))
-    position %= len(data)
-    if cut:
-        del data[position:]
-    else:
-        data[position] ^= change
-    try:
-        weights.from_safetensors(bytes(data), "net")
-    except TactileError:
-        return
-    assert not cut, "a truncated file was read"
 
 
 def write(tmp_path, tensors=TENSORS):

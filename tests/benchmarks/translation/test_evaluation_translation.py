@@ -13,12 +13,11 @@ from benchmarks.translation import test_set
 from benchmarks.translation.test_set import GAIN, NOISE, as_read
 from small_pairs import bodies, write_pairs
 
-from tactile_core import jobs, sensors
+from tactile_core import jobs
 from tactile_core.accuracy import COSTS
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training import step_errors
 from tactile_core.training.step_errors import error_columns, translation_metrics, true_displacement
-from tactile_core.translation.gel_place import contact_patch
 from tactile_core.translation.networks import WEIGHTS_FOLDER
 
 
@@ -134,21 +133,6 @@ def test_readings_have_the_stated_errors_and_repeat():
     read = as_read(change, 3)
     assert read.std() == pytest.approx(np.hypot(NOISE, 300 * GAIN), rel=0.02)  # 76,000 draws
     np.testing.assert_array_equal(read, as_read(change, 3))
-
-
-def test_the_patch_of_a_dent_is_where_it_bends_inward():
-    """A Gaussian dent of width w bends inward within sqrt(2) w of its middle: its Laplacian changes sign there."""
-    gel = sensors.digit_surface()
-    width, middle = 1.5e-3, np.array([-8e-3, 1e-3])
-    away = np.linalg.norm(gel.rest[:, [0, 2]] - middle, axis=1)
-    displacement = np.zeros((1, len(gel.rest), 3))
-    displacement[0, :, 1] = 0.4e-3 * np.exp(-0.5 * (away / width) ** 2)
-    patch = contact_patch(displacement, gel)[0]
-    radius = np.sqrt(2) * width
-    cell = 0.35e-3  # between nodes: the edge is known no better, and the smoothing widens it by less
-    assert patch[away < radius - 1.5 * cell].all()
-    assert not patch[away > radius + 1.5 * cell].any()
-    assert not contact_patch(np.zeros_like(displacement), gel).any()
 
 
 def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(request, tmp_path, monkeypatch, capsys):
