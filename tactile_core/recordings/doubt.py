@@ -51,15 +51,14 @@ LAW = frozenset({Reason.LAW_LEFT_OVER, Reason.LAW_PRESSURE, Reason.LAW_EXCHANGED
 
 
 class Doubt(str):
-    """Warning whose text is the sentence for users; it carries its reason, and the facts in it, name -> value."""
+    """Warning whose text is the sentence for users; it carries its reason."""
 
     reason: Reason
-    facts: dict[str, Any]
 
     def __new__(cls, reason: Reason, **facts: Any) -> Doubt:
         """Make the warning from the reason's sentence and the facts (name -> value) that fill its braces."""
         made = super().__new__(cls, reason.value.format(**facts))
-        made.reason, made.facts = reason, facts
+        made.reason = reason
         return made
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import TactileError
 from .electrode_faults import runs
 from .recording import BLOCK
-from .signal_kind import median
 
 WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
 FEWEST = 8  # frames of a window, at slow rates
@@ -103,7 +102,7 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
     if pdc is not None and np.isfinite(pdc).all():
         start = int(np.argmin(_sums(pdc, n)))
     else:
-        start = int(np.argmin(np.max([_spread(column - median(column), n) for column in electrodes.T], axis=0)))
+        start = int(np.argmin(np.max([_spread(column - np.median(column), n) for column in electrodes.T], axis=0)))
     return slice(start, start + n)
 
 
@@ -134,7 +133,7 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
     electrodes : (T, 19) counts; pdc : (T,) counts, or None; rate : Hz"""
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
-    medians = np.array([[median(column)] for column in electrodes.T])
+    medians = np.array([[np.median(column)] for column in electrodes.T])
     noise = _noise(electrodes, n)[:, None]
     sums, calm = np.zeros((electrodes.shape[1], count), np.float32), np.ones(count, bool)
     for start in range(0, count, BLOCK):  # sums of all would take seven times the recording

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from .quiet import TARED_PDC, Quiet
 from .recording import BLOCK
-from .signal_kind import WHOLE, counted
 
 LOWEST = 1.0  # percentile of PDC that is taken for rest where nothing is quiet: robust as a least value (assumed)
 
@@ -27,21 +25,11 @@ class Baseline:
         """Return the baseline that has the level counts (19,) in every frame."""
         return cls(np.zeros(1), np.asarray(counts, float)[None])
 
-    @functools.cached_property
-    def _slopes(self) -> np.ndarray:
-        """Return the slope (P, 19), counts per frame, after each of `frames`; 0 after the last."""
-        return np.diff(self.levels, axis=0, append=self.levels[-1:]) / np.diff(self.frames, append=np.inf)[:, None]
-
     def at(self, frames: np.ndarray) -> np.ndarray:
         """Return the readings at rest (n, 19) counts, for frames (n,); read-only."""
         if len(self.levels) == 1:
             return np.broadcast_to(self.levels[0], (len(frames), self.levels.shape[1]))
-        before = np.maximum(np.searchsorted(self.frames, frames, "right") - 1, 0)
-        since = np.clip(frames, self.frames[0], self.frames[-1]) - self.frames[before]
-        found = self._slopes[before]
-        found *= since[:, None]
-        found += self.levels[before]
-        return found
+        return np.column_stack([np.interp(frames, self.frames, column) for column in self.levels.T])
 
 
 class Changes:
@@ -95,9 +83,4 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 def level(samples: np.ndarray) -> np.ndarray:
     """Return the mean (19,) of the middle half of samples (n, 19): as robust as the median, but finer than a count."""
     cut = len(samples) // 4
-    counts = counted(samples)
-    if counts is None:
-        return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0, dtype=float)
-    last = np.cumsum(counts, axis=1)
-    inside = np.minimum(last, len(samples) - cut) - np.maximum(last - counts, cut)
-    return np.maximum(inside, 0) @ WHOLE / (len(samples) - 2 * cut)
+    return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0, dtype=float)

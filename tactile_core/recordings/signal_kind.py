@@ -14,7 +14,6 @@ RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Rupp
 # Larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed).
 SCALED_LIMIT = 20.0
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
-WHOLE = np.arange(-(2**15), 2**15)  # the histogram's numbers
 WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
 # Top of the range of raw readings in other units of measurement than 12-bit counts (assumed: the usual exports).
 FULL_SCALES = {
@@ -28,40 +27,9 @@ MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assu
 PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "psi": 6894.757}  # Pa
 # For pressures converted from counts: how well readings lie on steps of one count (1: all do), and steps they span.
 ON_STEPS, FEWEST_STEPS = 0.8, 4.0  # assumed
-PDC_AT_REST = (
-    800.0,
-    3000.0,
-)  # counts between which untared PDC rests: 915 to 2,405 in three fingers (assumed)
+PDC_AT_REST = 800.0, 3000.0  # counts between which untared PDC rests: 915 to 2,405 in three fingers (assumed)
 PDC_NOISE, LEAST_PDC_NOISE = 4.0, 0.2  # counts, limits of the neighbours' median difference; below, averaged (assumed)
 MOST_PDC = 1.01 * COUNT_MAX
-
-
-def counted(columns: np.ndarray) -> np.ndarray | None:
-    """Return the histograms (e, 65536) int of columns (T, e) of whole numbers, from -32,768 on; None for other numbers
-    and short columns. (They replace sorting, which takes long and twice the memory.)"""
-    if len(columns) < len(WHOLE):
-        return None
-    counts = np.empty((columns.shape[1], len(WHOLE)), int)
-    for j, column in enumerate(columns.T):
-        whole = column.astype(np.int32)
-        if (whole != column).any() or whole.min() < WHOLE[0] or whole.max() > WHOLE[-1]:
-            return None
-        counts[j] = np.bincount(whole - WHOLE[0], minlength=len(WHOLE))
-    return counts
-
-
-def percentiles(counts: np.ndarray, shares: list[float]) -> np.ndarray:
-    """Return the percentiles, as numpy's, of whole numbers. counts : (65536,) their histogram; shares : per cent"""
-    place = np.array(shares) / 100 * (counts.sum() - 1)
-    below = np.floor(place)
-    low, high = (WHOLE[np.searchsorted(np.cumsum(counts), rank, "right")] for rank in (below, np.ceil(place)))
-    return low + (high - low) * (place - below)
-
-
-def median(column: np.ndarray) -> float:
-    """Return the median of a column (T,) of finite numbers."""
-    counts = counted(column[:, None])
-    return float(np.median(column)) if counts is None else float(percentiles(counts[0], [50])[0])
 
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
@@ -84,15 +52,9 @@ def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
 def detect(electrodes: np.ndarray) -> tuple[str, str]:
     """Return the kind of electrodes (T, 19) float, finite, as in the file: "raw", "tared" (rest subtracted), "scaled"
     (tared, in another unit) or "rectified" (absolute changes); and what shows it, in words."""
-    counts = counted(electrodes)
-    if counts is not None:
-        levels = np.array([percentiles(each, [50])[0] for each in counts])
-        low, high = percentiles(counts.sum(axis=0), [0.5, 99.5])
-        whole = 1.0
-    else:  # a column at a time: memory
-        levels = np.array([np.median(column) for column in electrodes.T])
-        low, high = np.percentile(electrodes, [0.5, 99.5])
-        whole = sum(int((np.abs(column - np.rint(column)) < 1e-9).sum()) for column in electrodes.T) / electrodes.size
+    levels = np.array([np.median(column) for column in electrodes.T])  # a column at a time: memory
+    low, high = np.percentile(electrodes, [0.5, 99.5])
+    whole = sum(int((np.abs(column - np.rint(column)) < 1e-9).sum()) for column in electrodes.T) / electrodes.size
     negative = float(np.mean(electrodes < 0))
     numbers = "whole numbers" if whole > WHOLE_SHARE else f"{1 - whole:.0%} fractions"
     span = f"{numbers} from {low:.4g} to {high:.4g}"
