@@ -17,6 +17,7 @@ from ..files.version import __version__
 from .terminal import complain, discard_output, flush, say
 from .verbs import VERBS
 from .verbs.common import NOTHING
+from .verbs.doctor import LIBRARIES
 
 NAMES = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 
@@ -70,11 +71,8 @@ examples:
 SIGTERM or SIGHUP."""
 
 # module -> extra that brings it
-EXTRAS = {
-    "torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem",
-    "mitsuba": "render", "drjit": "render", "OpenEXR": "render", "rosbags": "ros", "lz4": "ros",
-    "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch", "cv2": "camera", "sklearn": "dataset",
-}  # fmt: skip
+EXTRAS = {each.module: each.extra for each in LIBRARIES if each.extra}
+EXTRAS |= {"rtree": "fem", "drjit": "render", "lz4": "ros", "dask_jobqueue": "batch", "sklearn": "dataset"}
 # Options that name something; that of --keep may be empty.
 PATHS = (
     "frames", "press", "weights", "cluster", "calibration", "sensor", "start", "background", "json", "sheet", "test",

@@ -141,25 +141,16 @@ def _drift(signals: Signals) -> str:
 
 def unit_rows(signals: Signals) -> list[tuple[str, str]]:
     """Return pairs (label, words) of what is known of the unit: its file's note, its fluid film and its stiffness."""
-    note = signals.report.get("sensor", {}).get("note")
-    return [*([("unit", note)] if note else []), *_film(signals), *_stiffness(signals)]
-
-
-def _film(signals: Signals) -> list[tuple[str, str]]:
-    found = signals.report["film"]
-    if found is None:
-        return []
-    least, most = found["conductivity_since_rest"]
-    thick = f"{found['thickness']:.2f} as thick as a typical unit's ({found['evidence']})"
-    return [("fluid film", f"{thick}; conductivity {least:.2f} to {most:.2f} of that at rest")]
-
-
-def _stiffness(signals: Signals) -> list[tuple[str, str]]:
-    unit = signals.report.get("sensor", {})
-    if "stiffness" not in unit:
-        return []
-    known = "" if unit["stiffness_error"] is None else f" (to {unit['stiffness_error']:.0%})"
-    return [("stiffness", f"{signals.stiffness:.2f} of a typical unit's{known}: force and pressure times it")]
+    unit, film = signals.report.get("sensor", {}), signals.report["film"]
+    rows = [("unit", unit["note"])] if unit.get("note") else []
+    if film is not None:
+        least, most = film["conductivity_since_rest"]
+        thick = f"{film['thickness']:.2f} as thick as a typical unit's ({film['evidence']})"
+        rows.append(("fluid film", f"{thick}; conductivity {least:.2f} to {most:.2f} of that at rest"))
+    if "stiffness" in unit:
+        known = "" if unit["stiffness_error"] is None else f" (to {unit['stiffness_error']:.0%})"
+        rows.append(("stiffness", f"{signals.stiffness:.2f} of a typical unit's{known}: force and pressure times it"))
+    return rows
 
 
 def _places(recording: Recording, signals: Signals) -> str:

@@ -41,23 +41,10 @@ class Opened(NamedTuple):
 
 
 @contextmanager
-def _reading(path: str) -> Iterator[None]:
-    """Raise an OSError or MemoryError of the block as TactileError."""
-    try:
-        yield
-    except OSError as error:
-        raise TactileError(
-            path, error.strerror or str(error), "a readable file", "Check the path and its permissions"
-        ) from error
-    except MemoryError as error:
-        raise TactileError(path, "too large for this machine's memory", advice="Split the recording") from error
-
-
-@contextmanager
 def opened(path: str) -> Iterator[Opened]:
     """Open a file, or the one in ``path#finger``, and detect its kind from its first bytes. Raises TactileError if it
     is missing or packed, or of a kind without fingers or topics, and for the system's errors in the block."""
-    with _reading(path):
+    try:
         file, finger, topic = split(path)
         if is_bag_folder(file):
             yield Opened("bag", file, finger, io.BytesIO())
@@ -78,6 +65,11 @@ def opened(path: str) -> Iterator[Opened]:
                 raise TactileError(file, f"topic {topic!r} of a file without topics", "path, or path#finger")
             plain.seek(0)
             yield Opened(container, file, finger, plain)
+    except OSError as error:
+        advice = "Check the path and its permissions"
+        raise TactileError(path, error.strerror or str(error), "a readable file", advice) from error
+    except MemoryError as error:
+        raise TactileError(path, "too large for this machine's memory", advice="Split the recording") from error
 
 
 def _end(file: BinaryIO) -> bytes:

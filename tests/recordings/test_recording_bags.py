@@ -243,7 +243,7 @@ def test_definitions_that_multiply_cost_no_time():
     nothing = [f"x/{name}\nx/{within}[1000] a\n" for name, within in ("BC", "CD", "DE")]
     bomb = defined("x/A\nint16[19] electrodes\nx/B[1000] a\n", *nothing, "x/E\n")
     with pytest.raises(ValueError, match="more entries than bytes"):
-        ros_messages.Decoder(bomb, ros1=True)(bytes(4000))
+        ros_messages.decoded(bomb, True, bytes(4000))
     wide = [f"x/{name}\n" + "".join(f"x/{within} f{i}\n" for i in range(100)) for name, within in pairwise("ABCDEF")]
     assert ros_messages.sensors_in(defined(*wide, "x/F\nint16 electrodes\n")) == []
     assert len(ros_messages.sensors_in(defined(*wide, "x/F\nint16[] electrodes\n"))) == ros_messages.MOST_SENSORS
@@ -283,13 +283,13 @@ def test_the_decoder_agrees_with_the_library_s(make):
         data = bytes((store.serialize_ros1 if ros1 else store.serialize_cdr)(sent, "x/msg/Odd"))
         whole = store.generate_msgdef("x/msg/Odd", ros_version=1 if ros1 else 2)[0]
         (definition,) = ros_messages.definitions("x/msg/Odd", whole, idl=False)
-        found = ros_messages.Decoder(definition, ros1)(data)
+        found = ros_messages.decoded(definition, ros1, data)
         assert (found["a"], found["b"], found["c"], found["d"], found["f"]) == (True, 7, -(2**40), "käse", 0.1)
         assert found["g"] == ["", "ab"] and found["electrodes"].tolist() == [-1, 5] and found["k"] == 9
         assert found["e"].tolist() == [1, 2, 3] and found["empty"].size == 0
         assert [float(each["y"]) for each in found["h"]] == [2.0, 5.0] and found["j"]["sec"] == 1
         with pytest.raises(ValueError, match="8 bytes are left"):
-            ros_messages.Decoder(definition, ros1)(data + bytes(8))
+            ros_messages.decoded(definition, ros1, data + bytes(8))
 
 
 def test_a_chunk_that_unpacks_to_too_much_is_refused(make, tmp_path, monkeypatch):

@@ -137,8 +137,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     from ...jobs.engine import inputs
     from ...jobs.engine import job as jobs
 
-    read = jobs.read if options.status or options.verify else jobs.read_to_run
-    there = read(folder) if jobs.exists(folder) else None
+    there = jobs.read_to_run(folder) if jobs.exists(folder) else None
     if not options.inputs:
         if there is None:
             raise TactileError(folder, "no job here", "INPUTS, or the folder of a job", "Name recordings to convert")

@@ -63,11 +63,8 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs.dataset import build_set
 
     layouts = list(dict.fromkeys(word for word in options.layouts.split(",") if word))
-    if not layouts:
-        raise TactileError("--to", "no layout", ", ".join(LAYOUTS))
-    for word in layouts:
-        if word not in LAYOUTS:
-            raise TactileError("--to", repr(word), ", ".join(LAYOUTS))
+    if not layouts or not set(layouts) <= set(LAYOUTS):
+        raise TactileError("--to", repr(options.layouts), f"one or more of {', '.join(LAYOUTS)}", "Separate by commas")
     engine.check_counts(options, "workers")
     asked = build_set.Asked(
         layouts, engine.place_of(options), say, lambda name, unit: bar(name, unit, options.progress),

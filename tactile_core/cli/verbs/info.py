@@ -43,7 +43,13 @@ def run(options: argparse.Namespace) -> int:
     from ...recordings.readers import each_finger
 
     if not options.recordings:
-        return _tell_sensor(options.sensor)
+        from ...sensors.about import about
+
+        if options.sensor is None:
+            advice = "`tactile info --help` has examples"
+            raise TactileError("FILE", "missing", "recordings, or --sensor NAME alone", advice)
+        tell(about(options.sensor))
+        return 0
     if options.columns is not None and not os.path.lexists(options.columns):
         _write_columns(options)
     unit = None
@@ -60,17 +66,6 @@ def run(options: argparse.Namespace) -> int:
             complain(str(error))
             failed += 1
     return 2 if failed else 0
-
-
-def _tell_sensor(name: str | None) -> int:
-    """Describe a sensor."""
-    from ...sensors.about import about
-
-    if name is None:
-        advice = "`tactile info --help` has examples"
-        raise TactileError("FILE", "missing", "recordings, or --sensor NAME alone", advice)
-    tell(about(name))
-    return 0
 
 
 def _write_columns(options: argparse.Namespace) -> None:

@@ -80,11 +80,13 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     path = options.rosbag_play or options.recording
     container = container_of(path)
-    if container != "csv" and not (options.play or options.rosbag_play):
+    playing = options.play or options.rosbag_play
+    if options.rosbag_play and container != "bag":
+        raise TactileError(path, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
+    if container != "csv" and not playing:
         raise TactileError(path, f"a finished recording ({container})", "a CSV file that grows", "Play it: add --play")
     if not 1 <= options.rate <= 1e4:
         raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
-    playing = options.play or options.rosbag_play
     columns = columns_of(options)
     if columns is not None:
         refuse_bag(path, container)
@@ -129,11 +131,6 @@ def _check(options: argparse.Namespace) -> None:
         raise TactileError("--idle", f"{options.idle:g}", "seconds, 0 or more")
     if options.out is not None:
         _check_out(options.out)
-    if options.rosbag_play is not None:
-        from ...recordings.opened_file import container_of
-
-        if container_of(options.rosbag_play) != "bag":
-            raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
 
 
 def _check_out(path: str) -> None:

@@ -14,7 +14,7 @@ from ...files.short_text import listed
 from ..assemble import MAX_FRAMES, assemble, check_electrodes, sensor_with
 from ..recording import Chosen, Recording, named
 from .bag import Bag, Topic, refused
-from .ros_messages import Decoder, channels, in_message, not_read, sensors_in, stamp_of
+from .ros_messages import channels, decoded, in_message, not_read, sensors_in, stamp_of
 
 # Messages read to find a hand's fingers with signals, from the bag's start and, for drivers that start late, from its
 # middle; more if none has signals.
@@ -178,19 +178,19 @@ def _messages(
 ) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
     """Yield, for each message from `start` (unix ns) on, its stamp, unix s, and for each sensor the other readings
     (pdc, tac, tdc, pac) and the electrodes, counts. A message without a stamp has the time at which it was recorded."""
-    known = [(Decoder(each, bag.ros1), sensors_in(each)) for each in topic.definitions]
+    known = [(each, sensors_in(each)) for each in topic.definitions]
     with refused(bag.path):
         for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections, start)):
-            message, known = _decoded(f"{bag.path}, {topic.name}, message {count}", topic.kind, known, data)
+            message, known = _decoded(f"{bag.path}, {topic.name}, message {count}", topic.kind, known, bag.ros1, data)
             sensors = [channels(one, fields) for fields in known[0][1] for one in in_message(message, fields)]
             yield stamp_of(message) or 1e-9 * written, sensors
 
 
-def _decoded(place: str, kind: str, known: list[Any], data: bytes) -> tuple[dict[str, Any], list[Any]]:
-    """Return a message, decoded by the first `known` pair (decoder, sensors) that fits, and that pair in a list."""
+def _decoded(place: str, kind: str, known: list[Any], ros1: bool, data: bytes) -> tuple[dict[str, Any], list[Any]]:
+    """Return a message, decoded by the first `known` pair (definition, sensors) that fits, and that pair in a list."""
     for one in known:
         try:
-            return one[0](data), [one]
+            return decoded(one[0], ros1, data), [one]
         except (ValueError, KeyError, RecursionError):  # another definition's bytes
             continue
     advice = "Export the topic as CSV with a ROS of its own version"

@@ -107,74 +107,68 @@ def _parsed(texts: dict[str, str]) -> dict[str, Any]:
     return {name: get_types_from_msg(text, name)[name] for name, text in texts.items()}
 
 
-class Decoder:
-    """Decode the messages of one type to dictionaries: field -> number, array, text, dictionary or list of these."""
-
-    def __init__(self, definition: Definition, ros1: bool) -> None:
-        self._definition, self._ros1 = definition, ros1
-
-    def __call__(self, data: bytes) -> dict[str, Any]:
-        """Return a decoded message. Raises ValueError, KeyError or RecursionError if it does not fit the definition."""
-        cursor = _Cursor(data, self._ros1)
-        message = self._message(cursor, self._definition.root)
-        if not 0 <= len(data) - cursor.place <= PADDING * (not self._ros1):
-            raise ValueError(f"{len(data) - cursor.place} bytes are left")
-        return message
-
-    def _message(self, cursor: _Cursor, name: str) -> dict[str, Any]:
-        cursor.count()
-        return {field: self._value(cursor, kind) for field, kind in self._definition.types[name]}
-
-    def _value(self, cursor: _Cursor, kind: Any) -> Any:
-        node, what = int(kind[0]), kind[1]
-        if node == NAME:
-            return self._message(cursor, what)
-        if node not in (ARRAY, SEQUENCE):
-            return cursor.text(what[0]) if "string" in what[0] else cursor.numbers(NUMBERS[what[0]], 1)[0]
-        of, count = what
-        if node == SEQUENCE:
-            count = int(cursor.numbers("u4", 1)[0])
-        numbers = None if int(of[0]) == NAME else NUMBERS.get(of[1][0])
-        if numbers is not None:
-            return cursor.numbers(numbers, count)
-        if count > len(cursor.data):  # each takes a byte or more
-            raise ValueError(f"{count} entries in {len(cursor.data)} bytes")
-        return [self._value(cursor, of) for _ in range(count)]
+def decoded(definition: Definition, ros1: bool, data: bytes) -> dict[str, Any]:
+    """Decode a message to a dictionary: field -> number, array, text, dictionary or list of these. Raises ValueError,
+    KeyError or RecursionError if it does not fit the definition."""
+    cursor = _Cursor(definition, ros1, data)
+    message = cursor.message(definition.root)
+    if not 0 <= len(data) - cursor.place <= PADDING * (not ros1):
+        raise ValueError(f"{len(data) - cursor.place} bytes are left")
+    return message
 
 
 class _Cursor:
     """Reader of a message's bytes in order: ROS 1 packs them, ROS 2 (CDR) aligns each number to its own size."""
 
-    def __init__(self, data: bytes, ros1: bool) -> None:
-        self.data, self.place, self._aligned, self._order, self._messages = data, 0, not ros1, "<", 0
+    def __init__(self, definition: Definition, ros1: bool, data: bytes) -> None:
+        self._types, self._data, self.place, self._aligned, self._order = definition.types, data, 0, not ros1, "<"
+        self._messages = 0
         if not ros1:
             self._order = {b"\0\0": ">", b"\0\1": "<"}[bytes(data[:2])]
             self.place = 4
 
-    def count(self) -> None:
-        """Raise ValueError once there are more nested messages than bytes, as empty ones in nested lists would make."""
+    def message(self, name: str) -> dict[str, Any]:
+        """Read the next message, of the type `name`. Raises ValueError once there are more nested messages than bytes,
+        as empty ones in nested lists would make."""
         self._messages += 1
-        if self._messages > len(self.data) + 64:
+        if self._messages > len(self._data) + 64:
             raise ValueError("more entries than bytes")
+        return {field: self._value(kind) for field, kind in self._types[name]}
 
-    def numbers(self, kind: str, count: int) -> np.ndarray:
+    def _value(self, kind: Any) -> Any:
+        node, what = int(kind[0]), kind[1]
+        if node == NAME:
+            return self.message(what)
+        if node not in (ARRAY, SEQUENCE):
+            return self._text(what[0]) if "string" in what[0] else self._numbers(NUMBERS[what[0]], 1)[0]
+        of, count = what
+        if node == SEQUENCE:
+            count = int(self._numbers("u4", 1)[0])
+        numbers = None if int(of[0]) == NAME else NUMBERS.get(of[1][0])
+        if numbers is not None:
+            return self._numbers(numbers, count)
+        if count > len(self._data):  # each takes a byte or more
+            raise ValueError(f"{count} entries in {len(self._data)} bytes")
+        return [self._value(of) for _ in range(count)]
+
+    def _numbers(self, kind: str, count: int) -> np.ndarray:
         """Return the next numbers (count,); kind : their type as numpy writes it, without byte order, as "u4" """
         dtype = np.dtype(self._order + kind)
         if count == 0:
             return np.empty(0, dtype)
         if self._aligned:
             self.place += -(self.place - 4) % dtype.itemsize
-        found = np.frombuffer(self.data, dtype, count, self.place)
+        found = np.frombuffer(self._data, dtype, count, self.place)
         self.place += found.nbytes
         return found
 
-    def text(self, kind: str) -> str:
+    def _text(self, kind: str) -> str:
         """Read the next text, of kind "string" or "wstring"."""
-        length = int(self.numbers("u4", 1)[0]) * (2 if kind == "wstring" else 1)
+        length = int(self._numbers("u4", 1)[0]) * (2 if kind == "wstring" else 1)
         self.place += length
-        if self.place > len(self.data):
+        if self.place > len(self._data):
             raise ValueError(f"a text of {length} bytes")
-        return bytes(self.data[self.place - length : self.place]).rstrip(b"\0").decode("utf-8", "replace")
+        return bytes(self._data[self.place - length : self.place]).rstrip(b"\0").decode("utf-8", "replace")
 
 
 @dataclass(frozen=True)

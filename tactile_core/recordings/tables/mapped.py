@@ -196,8 +196,6 @@ def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap
         table = read_json(path, file) if container == "json" else next(read_tables(path, file, GUESSED_BY, 0))[0]
         return guess(table.header, table), table.header
     with open_store(path, container, file) as store:
-        names = names_of(store)
-        found = guess(names)
-        return [with_unit(each, table_of(store, [each.time])) if each.time else each for each in found], tuple(
-            store.shapes
-        )
+        found = guess(names_of(store))
+        timed = [with_unit(each, table_of(store, [each.time])) if each.time else each for each in found]
+        return timed, tuple(store.shapes)

@@ -240,8 +240,6 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
     if not kept:
         advice = "Check that the recording was written to its end"
         raise TactileError(path, "a header without data rows", "at least one frame", advice)
-    if len(kept) > MAX_FRAMES:
-        raise TactileError(path, f"{len(kept):,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
     problems: list[Problem] = []
     rows = [line for _, line in kept]
     cells = header.cells(rows)
