@@ -7,42 +7,40 @@ import pytest
 
 
 @pytest.fixture
-def translated(imported):
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
-    return bpy.context.scene.objects["DIGIT gel"]
+def gel(pressed_gel):
+    return pressed_gel
 
 
-def test_renamed_parts_are_known_by_their_roles(translated, part):
-    for thing in (*translated.children_recursive, translated):
+def test_renamed_parts_are_known_by_their_roles(gel, part):
+    for thing in (*gel.children_recursive, gel):
         thing.name = f"my {thing.name}"
-    assert part("addon.objects.digit_body").leds_of(translated).keys() == {"red", "green", "blue"}
+    assert part("addon.objects.digit_body").leds_of(gel).keys() == {"red", "green", "blue"}
     assert bpy.ops.tactile.set_style(style="DISPLACEMENT") == {"FINISHED"}
     assert bpy.ops.tactile.set_up_render() == {"FINISHED"}
     assert bpy.ops.tactile.translate() == {"FINISHED"}
     assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
 
 
-def test_a_renamed_gel_keeps_its_contact_patch(translated, imported, nodes_of):
+def test_a_renamed_gel_keeps_its_contact_patch(gel, imported, nodes_of):
     def patch(gel):
         held = gel.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes["contact_patch"]
         return [each.value for each in held.data]
 
     bpy.context.scene.frame_set(85)
-    before, translated.name = patch(translated), "mine"
-    copy = translated.copy()
+    before, gel.name = patch(gel), "mine"
+    copy = gel.copy()
     bpy.context.scene.collection.objects.link(copy)
     imported(frames="0:20")
     bpy.ops.tactile.translate()
     bpy.ops.tactile.translate()  # replaces its own
     bpy.context.scene.frame_set(85)
-    assert any(before) and patch(translated) == before == patch(copy)
+    assert any(before) and patch(gel) == before == patch(copy)
     assert sum("contact patch" in image.name for image in bpy.data.images) == 2
 
 
-def test_a_deleted_gel_comes_back_with_its_body(translated):
+def test_a_deleted_gel_comes_back_with_its_body(gel):
     skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
-    for thing in (*translated.children_recursive, translated):
+    for thing in (*gel.children_recursive, gel):
         bpy.data.objects.remove(thing)
     bpy.context.view_layer.objects.active = skin
     with pytest.raises(RuntimeError, match="no DIGIT"):
@@ -51,48 +49,41 @@ def test_a_deleted_gel_comes_back_with_its_body(translated):
     assert sum(thing.tactile.role == "LED" for thing in bpy.context.scene.objects) == 3
 
 
-def test_a_deleted_skin_is_asked_for(translated):
+def test_a_deleted_skin_is_asked_for(gel):
     bpy.data.objects.remove(next(t for t in bpy.context.scene.objects if t.tactile.role == "BIOTAC"))
     assert not bpy.ops.tactile.translate.poll()
     assert bpy.ops.tactile.set_style(style="CONTACT_PATCH") == {"FINISHED"}
 
 
-def test_two_gels_are_drawn_each_by_its_own_parts(translated, part):
-    copy = translated.copy()
+def test_two_gels_are_drawn_each_by_its_own_parts(gel, draw, part):
+    copy = gel.copy()
     copy.location.y += 80
     bpy.context.scene.collection.objects.link(copy)
-    draw, leds = part("addon.operators.pictures").draw, part("addon.objects.digit_body").leds_of
-
-    def drawn():
-        bpy.context.view_layer.update()
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        return [draw(gel, depsgraph, "fast")[0].astype(int) for gel in (translated, copy)]
-
-    before = drawn()
-    leds(translated)["red"].data.energy = 0.0
-    after = drawn()
+    before = [draw(gel) for gel in (gel, copy)]
+    part("addon.objects.digit_body").leds_of(gel)["red"].data.energy = 0.0
+    after = [draw(gel) for gel in (gel, copy)]
     assert (before[0] - after[0]).max() > 50  # levels: the red LED is off
     assert (before[1] == after[1]).all()  # a copy without LEDs has the calibration's
 
 
-def test_the_camera_s_gel_is_drawn_with_an_empty_between(translated, part):
+def test_the_camera_s_gel_is_drawn_with_an_empty_between(gel, part):
     bpy.ops.tactile.set_up_render()
-    copy, empty = translated.copy(), bpy.data.objects.new("empty", None)
+    copy, empty = gel.copy(), bpy.data.objects.new("empty", None)
     for thing in (copy, empty):
         bpy.context.scene.collection.objects.link(thing)
     empty.parent, bpy.context.scene.camera.parent = copy, empty
     assert part("addon.settings.properties").gel_of(bpy.context.scene) == copy
 
 
-def test_a_material_of_the_user_s_is_kept_beside_the_coating(translated):
+def test_a_material_of_the_user_s_is_kept_beside_the_coating(gel):
     """Set Up Render removed it, and the next save lost it."""
     own = bpy.data.materials.new("velvet")
-    translated.data.materials.clear()
-    translated.data.materials.append(own)
+    gel.data.materials.clear()
+    gel.data.materials.append(own)
     bpy.ops.tactile.set_up_render()
-    first, second = (slot.material for slot in translated.material_slots)
+    first, second = (slot.material for slot in gel.material_slots)
     assert first.name.startswith("DIGIT coating") and second == own
-    assert not any(face.material_index for face in translated.data.polygons)
+    assert not any(face.material_index for face in gel.data.polygons)
 
 
 @pytest.mark.parametrize("scale", [(1, 1, -1), (-1, 1, 1), (0, 1, 1)])
@@ -108,29 +99,28 @@ def test_a_mirrored_indenter_is_refused_in_words(scene, scale):
 
 
 @pytest.mark.parametrize("scale", [(1, 1, -1), (2, 2, 2), (3, 1, 1)])
-def test_a_scaled_or_mirrored_gel_draws_what_it_drew(translated, part, scale):
-    draw, frame = part("addon.operators.pictures").draw, bpy.context.scene.frame_current
-    before = draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")[0]
-    translated.scale = scale
-    bpy.context.scene.frame_set(frame)
-    assert (draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")[0] == before).all()
+def test_a_scaled_or_mirrored_gel_draws_what_it_drew(gel, draw, scale):
+    before = draw(gel)
+    gel.scale = scale
+    bpy.context.scene.frame_set(80)
+    assert (draw(gel) == before).all()
 
 
-def test_a_gel_scaled_to_nothing_is_named(translated, part):
+def test_a_gel_scaled_to_nothing_is_named(gel, draw, part):
     pytest.importorskip("msgspec")
     bpy.ops.tactile.add_indenter(shape="sphere")
     ball = bpy.context.object
-    translated.scale = (0, 1, 1)
+    gel.scale = (0, 1, 1)
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="DIGIT gel: a scale of 0"):
         bpy.ops.tactile.snap_to_gel()
     with pytest.raises(part("tactile_core.errors").TactileError, match="DIGIT gel: a scale of 0"):
-        part("addon.operators.pictures").draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")
+        draw(gel)
     depth_of = part("addon.operators.snap_to_gel").depth_of
     assert depth_of(bpy.context, ball) is None  # the panel goes on
 
 
-def test_the_panel_goes_on_where_the_indenter_meets_no_gel(translated, part):
+def test_the_panel_goes_on_where_the_indenter_meets_no_gel(gel, part):
     pytest.importorskip("msgspec")
     bpy.ops.tactile.add_indenter(shape="sphere")
     ball = bpy.context.object
@@ -160,7 +150,7 @@ def test_what_lay_beside_a_moved_file_is_named(imported, tmp_path, part):
         bpy.ops.render.render()
 
 
-def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
+def test_a_linked_sensor_is_left_alone_in_words(gel, tmp_path):
     """A library's objects are read-only."""
     path = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -181,12 +171,12 @@ def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
         bpy.ops.tactile.translate()  # whose keys are the mesh's, not an override's
 
 
-def test_a_file_of_the_former_version_gets_what_it_lacks(translated):
+def test_a_file_of_the_former_version_gets_what_it_lacks(gel):
     """Format 1 had no colour on its meshes and no friction of a press."""
-    translated.data.attributes.active_color_name = ""
-    translated.tactile.format, translated.add_rest_position_attribute = 1, False
+    gel.data.attributes.active_color_name = ""
+    gel.tactile.format, gel.add_rest_position_attribute = 1, False
     assert bpy.ops.tactile.set_style(style="DISPLACEMENT") == {"FINISHED"}
-    shown = translated.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    shown = gel.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     assert shown.color_attributes.active_color.name == "Tactile colour"
 
 

@@ -10,29 +10,12 @@ RECORDING = Path(__file__).resolve().parents[2] / "scenes" / "press_roll_slide" 
 
 
 @pytest.fixture
-def gel(imported):
+def gel(pressed_gel):
     """A translated gel, moved in the scene, its red LED dimmed, on a pressed frame."""
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
     bpy.ops.tactile.set_up_render()
-    bpy.context.scene.frame_set(80)
-    found = bpy.context.scene.objects["DIGIT gel"]
-    found.location = (30, 20, 5)
+    pressed_gel.location = (30, 20, 5)
     bpy.data.objects["LED red"].data.energy *= 0.5
-    return found
-
-
-@pytest.fixture
-def draw(part):
-    """``draw(gel)``: its picture, float."""
-
-    def run(gel):
-        bpy.context.view_layer.update()
-        return (
-            part("addon.operators.pictures").draw(gel, bpy.context.evaluated_depsgraph_get(), "fast")[0].astype(float)
-        )
-
-    return run
+    return pressed_gel
 
 
 def duplicate(gel, *parts, linked=False):

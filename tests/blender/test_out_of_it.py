@@ -7,20 +7,12 @@ import pytest
 FRAMES = (72, 80)
 
 
-@pytest.fixture
-def gel(imported):
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
-    bpy.context.scene.frame_set(FRAMES[1])
-    return bpy.context.scene.objects["DIGIT gel"]
-
-
-def test_the_picture_s_scene_is_mitsuba_s(gel, part, needs, tmp_path):
+def test_the_picture_s_scene_is_mitsuba_s(pressed_gel, part, needs, tmp_path):
     needs("OpenEXR")
     bpy.data.lights["LED red"].energy *= 0.5
     bpy.context.view_layer.update()
     pictures, write = part("addon.operators.pictures"), part("tactile_core.pictures.mitsuba.scene_file").write_scene
-    shown, moved = pictures.shown_state(gel, bpy.context.evaluated_depsgraph_get())
+    shown, moved = pictures.shown_state(pressed_gel, bpy.context.evaluated_depsgraph_get())
     for name in ("blender", "core"):
         (tmp_path / name).mkdir()
     assert bpy.ops.tactile.export_mitsuba(filepath=str(tmp_path / "blender" / "gel.xml")) == {"FINISHED"}
@@ -49,8 +41,9 @@ def usd(path, start, end):
     bpy.ops.wm.usd_import(filepath=path)
 
 
+@pytest.mark.usefixtures("pressed_gel")
 @pytest.mark.parametrize(("ending", "through"), [("abc", alembic), ("usdc", usd)])
-def test_sensors_and_their_motion_come_back(gel, nodes_of, tmp_path, ending, through):
+def test_sensors_and_their_motion_come_back(nodes_of, tmp_path, ending, through):
     if through.__name__ == "alembic" and "alembic_export" not in dir(bpy.ops.wm):
         pytest.skip("this Blender has no Alembic")
 

@@ -6,10 +6,8 @@ import pytest
 
 
 @pytest.fixture
-def follow(imported, part):
+def follow(pressed_gel, part):
     """``follow(frame)``: what a window's handlers do, and the picture (H W, 3) as it is then seen."""
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
     preview = part("addon.operators.preview")
 
     def look(frame=None):
@@ -21,14 +19,16 @@ def follow(imported, part):
     return look
 
 
-def test_another_frame_draws_its_own_picture(follow, part):
-    first = bpy.context.scene.frame_current
+def test_another_frame_draws_its_own_picture(follow, pressed_gel, draw):
     pressed, resting = follow(), follow(70)
-    gel, depsgraph = bpy.context.scene.objects["DIGIT gel"], bpy.context.evaluated_depsgraph_get()
-    wanted = part("addon.operators.pictures").draw(gel, depsgraph, "fast")[0][::-1].reshape(-1, 3) / 255
-    np.testing.assert_allclose(resting, wanted, atol=1e-6)
+    np.testing.assert_allclose(resting, seen(draw(pressed_gel)), atol=1e-6)
     assert np.abs(pressed - resting).max() > 0.05  # ten levels
-    np.testing.assert_array_equal(follow(first), pressed)
+    np.testing.assert_array_equal(follow(80), pressed)
+
+
+def seen(picture):
+    """Its levels as an image of Blender's holds them."""
+    return picture[::-1].reshape(-1, 3) / 255
 
 
 def test_what_did_not_change_is_not_drawn_again(follow, part, monkeypatch):
@@ -50,13 +50,12 @@ def test_a_changed_lamp_draws_and_one_that_cannot_be_says_so(follow, part):
 
 def test_an_opened_file_draws_the_frame_it_opens_on(follow, tmp_path):
     pressed = follow()
-    first = bpy.context.scene.frame_current
     bpy.context.scene.frame_set(70)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "touch.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "touch.blend"))
     resting = follow()
     assert np.abs(pressed - resting).max() > 0.05  # ten levels
-    np.testing.assert_allclose(follow(first), pressed, atol=1 / 255)
+    np.testing.assert_allclose(follow(80), pressed, atol=1 / 255)
 
 
 def test_a_redone_translation_has_its_picture(follow):
@@ -92,7 +91,7 @@ def test_gels_of_two_scenes_have_a_picture_each(follow, imported):
     assert len(found) == 3 and first in found
 
 
-def test_each_gel_has_a_picture_of_its_own(follow, imported, part):
+def test_each_gel_has_a_picture_of_its_own(follow, imported, draw, part):
     first = follow()
     second = imported(frames="100:120", first_frame=-30)
     bpy.ops.tactile.translate()
@@ -103,8 +102,7 @@ def test_each_gel_has_a_picture_of_its_own(follow, imported, part):
     assert part("addon.objects.images").image_of(copy, "picture") is None
     follow(70)
     shown = [np.array(gel.tactile.picture.pixels[:]).reshape(-1, 4)[:, :3] for gel in gels]
-    depsgraph, draw = bpy.context.evaluated_depsgraph_get(), part("addon.operators.pictures").draw
     for gel, pixels in zip(gels, shown, strict=True):
-        np.testing.assert_allclose(pixels, draw(gel, depsgraph, "fast")[0][::-1].reshape(-1, 3) / 255, atol=1e-6)
+        np.testing.assert_allclose(pixels, seen(draw(gel)), atol=1e-6)
     assert np.abs(shown[0] - shown[1]).max() > 0.05 < np.abs(shown[0] - first).max()
     assert gels[0].tactile.heights != gels[1].tactile.heights

@@ -1,5 +1,6 @@
 """The render engine: files as Blender people expect them, with the library's own pixels in them."""
 
+import dataclasses
 import importlib.util
 import subprocess
 import sys
@@ -15,10 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
-def ready(imported):
+def ready(pressed_gel):
     """A translated recording, set up to render."""
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
     bpy.ops.tactile.set_up_render()
     return bpy.context.scene
 
@@ -32,17 +31,27 @@ def _pixels(path):
     return values.reshape(height, width, 4)[::-1, :, :3]
 
 
-def _wanted(part, frame=80):
-    found = part("addon.operators.recording_data")._KEPT
-    displacement = next(iter(found.values())).translation.displacement_digit[frame - 70]
-    heights = part("tactile_core.pictures.height_map").height_map(displacement)
-    return part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights)
+@pytest.fixture
+def wanted(loaded, part):
+    """``wanted(80)``: the library's picture of a frame."""
+
+    def draw(frame=80):
+        displacement = loaded("70:90").translation.displacement_digit[frame - 70]
+        heights = part("tactile_core.pictures.height_map").height_map(displacement)
+        return part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights)
+
+    return draw
+
+
+@pytest.fixture
+def left_out(ready, part):
+    """``left_out()``: sentences on what of the scene the picture leaves out."""
+    return lambda: part("addon.objects.digit_unit").left_out(ready, ready.objects["DIGIT gel"])
 
 
 @pytest.fixture
 def rendered(ready, tmp_path):
     """``rendered(file="frame.png", **options)``: renders frame 80 and reads the levels of the file."""
-    ready.frame_set(80)
 
     def run(file="frame.png", **options):
         ready.render.filepath = str(tmp_path / "frame.png")
@@ -53,13 +62,13 @@ def rendered(ready, tmp_path):
 
 
 @pytest.mark.parametrize("view", ["Raw", "Standard"])
-def test_a_frame_holds_the_library_s_own_pixels(ready, rendered, part, view):
+def test_a_frame_holds_the_library_s_own_pixels(ready, rendered, wanted, view):
     assert ready.view_settings.view_transform == "Raw"
     ready.view_settings.view_transform = view
     levels = rendered()
     assert levels.shape == (320, 240, 3)
     # A level: displacements of 30 mm coordinates are held in float32, and colour goes through sRGB's curve and back.
-    assert np.abs(levels - _wanted(part).astype(float)).max() <= 1
+    assert np.abs(levels - wanted()).max() <= 1
 
 
 def test_an_animation_writes_every_frame(ready, tmp_path):
@@ -69,13 +78,13 @@ def test_an_animation_writes_every_frame(ready, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0078.png", "0079.png", "0080.png"]
 
 
-def test_the_percentage_scales_the_picture(ready, rendered, part):
+def test_the_percentage_scales_the_picture(ready, rendered, wanted):
     ready.render.resolution_percentage = 200
     large = rendered()
     assert large.shape == (640, 480, 3)
     small = large.reshape(320, 2, 240, 2, 3).mean(axis=(1, 3))
     # The same view: means of four pixels against one, which differ at the dent's steep rim alone.
-    assert np.abs(small - _wanted(part)).mean() < 1
+    assert np.abs(small - wanted()).mean() < 1
 
 
 @pytest.mark.parametrize("percent", [12, 33, 66, 67, 150])
@@ -188,40 +197,33 @@ def test_what_is_left_out_is_said(ready, part, capfd):
         assert words in said.out + said.err
 
 
-def test_colours_of_the_output_alone_are_seen_and_set_back(ready, part, tmp_path):
+def test_colours_of_the_output_alone_are_seen_and_set_back(ready, wanted, left_out, tmp_path):
     """They override the scene's: by Standard the same levels are written, by an exposure others, which is said."""
-    left_out, gel, image = (
-        part("addon.objects.digit_unit").left_out,
-        ready.objects["DIGIT gel"],
-        ready.render.image_settings,
-    )
+    image = ready.render.image_settings
     image.color_management, image.view_settings.view_transform = "OVERRIDE", "Standard"
     ready.render.filepath = str(tmp_path / "frame.png")
     bpy.ops.render.render(write_still=True)
-    wanted = _wanted(part, ready.frame_current).astype(float)
-    assert left_out(ready, gel) == []
-    assert np.abs(np.rint(255 * _pixels(tmp_path / "frame.png")) - wanted).max() <= 1
+    picture = wanted(ready.frame_current)
+    assert left_out() == []
+    assert np.abs(np.rint(255 * _pixels(tmp_path / "frame.png")) - picture).max() <= 1
     image.view_settings.exposure, ready.view_settings.use_curve_mapping = 1.0, True
     image.color_mode = "BW"
-    assert left_out(ready, gel) == ["Exposure, Color BW change the levels; Set Up Render sets Raw alone"]
+    assert left_out() == ["Exposure, Color BW change the levels; Set Up Render sets Raw alone"]
     bpy.ops.tactile.set_up_render()
-    assert left_out(ready, gel) == [] and image.color_management == "FOLLOW_SCENE"
+    assert left_out() == [] and image.color_management == "FOLLOW_SCENE"
 
 
-def test_set_up_render_leaves_nothing_in_the_picture_s_place(ready, rendered, part):
+def test_set_up_render_leaves_nothing_in_the_picture_s_place(ready, rendered, left_out):
     whole, render = rendered(), ready.render
     render.use_border, render.border_max_x, ready.view_layers[0].use = True, 0.5, False
     render.use_stamp = render.use_sequencer = True
-    assert part("addon.objects.digit_unit").left_out(ready, ready.objects["DIGIT gel"]) == [
-        "Burn Into Image changes the levels; Set Up Render sets Raw alone"
-    ]
+    assert left_out() == ["Burn Into Image changes the levels; Set Up Render sets Raw alone"]
     bpy.ops.tactile.set_up_render()
     assert not render.use_sequencer
     np.testing.assert_array_equal(rendered(), whole)
 
 
-def test_a_compositor_that_changes_the_picture_is_said(ready, part):
-    left_out, gel = part("addon.objects.digit_unit").left_out, ready.objects["DIGIT gel"]
+def test_a_compositor_that_changes_the_picture_is_said(ready, left_out):
     if bpy.app.version >= (5, 0, 0):
         tree = ready.compositing_node_group = bpy.data.node_groups.new("nodes", "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -229,32 +231,31 @@ def test_a_compositor_that_changes_the_picture_is_said(ready, part):
     else:
         ready.use_nodes, kind = True, "CompositorNodeComposite"
         tree = ready.node_tree
-        assert left_out(ready, gel) == []  # as Blender begins
+        assert left_out() == []  # as Blender begins
         tree.nodes.clear()
     layers, between, end = (tree.nodes.new(name) for name in ("CompositorNodeRLayers", "NodeReroute", kind))
     tree.links.new(layers.outputs["Image"], between.inputs[0])
-    assert "compositor" in left_out(ready, gel)[0]
+    assert "compositor" in left_out()[0]
     tree.links.new(between.outputs[0], end.inputs[0])
-    assert left_out(ready, gel) == []
+    assert left_out() == []
     tree.links.new(between.outputs[0], between.inputs[0])  # a circle, in place of what is rendered
-    assert "compositor" in left_out(ready, gel)[0]
+    assert "compositor" in left_out()[0]
     ready.render.use_compositing = False
     tree.links.clear()
-    assert left_out(ready, gel) == []
+    assert left_out() == []
 
 
-def test_a_gel_that_is_moved_as_an_object_does_not_stand_still(ready, part):
-    left_out, gel = part("addon.objects.digit_unit").left_out, ready.objects["DIGIT gel"]
-    ready.frame_set(80)
+def test_a_gel_that_is_moved_as_an_object_does_not_stand_still(ready, left_out, part):
+    gel = ready.objects["DIGIT gel"]
     gel.animation_data.action = None
     for frame in (1, 10):
         gel.keyframe_insert("location", frame=frame)
-    assert left_out(ready, gel) == []
+    assert left_out() == []
     ready.frame_set(5)
-    assert left_out(ready, gel) == ["Frame 5: DIGIT gel stands still, it moves from 70 to 89"]
+    assert left_out() == ["Frame 5: DIGIT gel stands still, it moves from 70 to 89"]
     curve = part("addon.objects.curves").fcurves_of(gel.data.shape_keys).find("eval_time")
     curve.modifiers.new("CYCLES")
-    assert left_out(ready, gel) == []
+    assert left_out() == []
 
 
 def test_hidden_leds_and_meshes_in_the_housing_are_told(ready, part, capfd):
@@ -269,13 +270,12 @@ def test_hidden_leds_and_meshes_in_the_housing_are_told(ready, part, capfd):
 
 
 @pytest.mark.parametrize("kind", ["OPEN_EXR", "HDR", "DPX"])
-def test_linear_light_by_raw_says_how_to_look_at_it(ready, part, kind):
+def test_linear_light_by_raw_says_how_to_look_at_it(ready, left_out, kind):
     if kind not in ready.render.image_settings.bl_rna.properties["file_format"].enum_items:
         pytest.skip("this Blender has no such files")
-    left_out = part("addon.objects.digit_unit").left_out
-    assert left_out(ready, ready.objects["DIGIT gel"]) == []
+    assert left_out() == []
     ready.render.image_settings.file_format = kind
-    (words,) = left_out(ready, ready.objects["DIGIT gel"])
+    (words,) = left_out()
     assert "view transform Standard" in words
 
 
@@ -295,13 +295,13 @@ def test_without_leds_it_is_dark(ready, rendered):
 
 
 @pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "frame.exr"), ("HDR", "frame.hdr")])
-def test_linear_light_holds_the_same_in_float(ready, part, tmp_path, kind, name):
+def test_linear_light_holds_the_same_in_float(ready, part, wanted, tmp_path, kind, name):
     ready.frame_set(80)
     ready.render.image_settings.file_format = kind
     ready.render.filepath = str(tmp_path / name)
     bpy.ops.render.render(write_still=True)
     linear = _pixels(tmp_path / name)
-    picture = part("addon.operators.render_engine").to_linear(_wanted(part))[..., :3]
+    picture = part("addon.operators.render_engine").to_linear(wanted())[..., :3]
     assert np.abs(linear - picture).max() < 0.01  # a grey level is at most 0.009 of linear light
 
 
@@ -368,24 +368,29 @@ TRACED = importlib.util.find_spec("mitsuba") is not None
 
 
 @pytest.mark.skipif(not TRACED, reason="mitsuba is missing")
-def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, rendered, part):
+def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, rendered, wanted):
     ready.tactile_render.preset = "standard"
-    assert (
-        np.sqrt(np.mean((rendered() - _wanted(part)) ** 2)) < 5
-    )  # grey levels: fast and standard differ by one or two
+    assert np.sqrt(np.mean((rendered() - wanted()) ** 2)) < 5  # grey levels: fast and standard differ by one or two
 
 
 @pytest.fixture
-def traced(part):
-    """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; and what draws a gel's heights."""
+def at_rest(part):
+    """Unit, surroundings and heights (H, W) m of a resting gel."""
     unit = part("tactile_core.sensors.calibration_file").load_calibration()
     nothing = part("tactile_core.pictures.mitsuba.gel_scene").NOTHING
+    return unit, nothing, part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
+
+
+@pytest.fixture
+def traced(part, at_rest):
+    """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; and what draws a gel's heights."""
+    unit, nothing, heights = at_rest
     tracer = part("addon.process.tracer_process").Tracer("fast")
 
     def draw(heights, stopped=lambda: False, unit=unit, better=lambda picture: None):
         return tracer.draw(unit, nothing, heights, stopped, better)
 
-    yield tracer, draw, part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
+    yield tracer, draw, heights
     tracer.close()
 
 
@@ -398,42 +403,27 @@ def test_a_worker_draws_what_the_library_draws(traced, part):
         np.testing.assert_array_equal(draw(height), renderer(height))
 
 
-def test_a_worker_takes_another_unit(traced, part):
-    import dataclasses
-
-    _, draw, heights = traced
-    unit = part("tactile_core.sensors.calibration_file").load_calibration()
+def test_a_worker_takes_another_unit(traced, at_rest, part):
+    (_, draw, heights), unit = traced, at_rest[0]
     off = dataclasses.replace(unit, leds=(dataclasses.replace(unit.leds[0], radiance=0.0), *unit.leds[1:]))
     renderer = part("tactile_core.pictures.renderer").Renderer(off, "fast")
     draw(heights)
     np.testing.assert_array_equal(draw(heights, unit=off), renderer(heights))
 
 
-def test_an_idle_worker_ends_after_a_minute(part, monkeypatch):
+def test_a_worker_gets_ready_before_its_first_picture_and_ends_after_an_idle_minute(at_rest, part, monkeypatch):
     process = part("addon.process.tracer_process")
-    unit = part("tactile_core.sensors.calibration_file").load_calibration()
-    heights = part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
-    nothing = part("tactile_core.pictures.mitsuba.gel_scene").NOTHING
-    process.draw("fast", unit, nothing, heights, lambda: False, lambda picture: None)
-    worker = process._kept["fast"]._job._process
+    process.prepare("fast", *at_rest[:2])
+    ready = process._kept["fast"]
+    picture = process.draw("fast", *at_rest, lambda: False, lambda picture: None)
+    assert process._kept["fast"] is ready
+    np.testing.assert_array_equal(picture, part("tactile_core.pictures.renderer").Renderer(preset="fast")(at_rest[2]))
+    worker = ready._job._process
     process.close_idle()
     assert worker.poll() is None
     monkeypatch.setattr(process, "_IDLE", -1.0)
     process.close_idle()
     assert worker.poll() is not None and not process._kept
-
-
-def test_a_worker_gets_ready_before_its_first_picture(part):
-    process = part("addon.process.tracer_process")
-    unit = part("tactile_core.sensors.calibration_file").load_calibration()
-    heights = part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
-    nothing = part("tactile_core.pictures.mitsuba.gel_scene").NOTHING
-    process.prepare("fast", unit, nothing)
-    ready = process._kept["fast"]
-    picture = process.draw("fast", unit, nothing, heights, lambda: False, lambda picture: None)
-    assert process._kept["fast"] is ready
-    np.testing.assert_array_equal(picture, part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights))
-    process.close_all()
 
 
 def test_another_file_ends_the_workers(part):

@@ -7,11 +7,8 @@ from mathutils import Vector
 
 
 @pytest.fixture
-def gel(imported):
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
-    bpy.context.scene.frame_set(80)
-    return bpy.context.scene.objects["DIGIT gel"]
+def gel(pressed_gel):
+    return pressed_gel
 
 
 def shown(gel, name, width, field):
@@ -116,10 +113,7 @@ def test_a_style_fits_what_is_translated_after_it_unless_set_by_hand(imported, p
     assert nodes.get_input(gel.modifiers["Tactile style"], nodes.EXAGGERATION) == pytest.approx(2.0)
 
 
-def test_a_contact_patch_is_coloured_though_the_style_came_first(imported, part):
-    imported(frames="70:90")
-    bpy.ops.tactile.translate()
-    gel = bpy.context.scene.objects["DIGIT gel"]
+def test_a_contact_patch_is_coloured_though_the_style_came_first(gel, part):
     gel.modifiers.remove(part("addon.objects.frame_attribute").modifier_of(gel, "contact_patch"))
     bpy.ops.tactile.set_style(style="CONTACT_PATCH")
     bpy.ops.tactile.translate()
