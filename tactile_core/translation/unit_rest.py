@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..recordings.polarity import spread_out
 from ..recordings.quiet import TARED_PDC, window_frames
 from ..recordings.repair import fill
 from ..recordings.rest_level import level
-from ..recordings.signal_kind import detect, in_counts
+from ..recordings.signal_kind import detect, full_scale, in_counts
 from ..recordings.signals import UNIT_DRIFT
 from ..recordings.tables.column_map import ColumnMap
 from ..sensors import COUNT_MAX, divider
@@ -63,9 +63,10 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     if len(recordings) < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
         raise TactileError("rest of the unit", f"{len(recordings)} recordings", f"at least {FEWEST}", advice)
-    pressures = [pdc for pdc in map(_pressure, recordings) if pdc is not None and np.isfinite(pdc).all()]
+    recordings = [_raw(one) for one in recordings]
+    pressures = [one.pdc for one in recordings if one.pdc is not None and np.isfinite(one.pdc).all()]
     if len(pressures) < len(recordings):
-        levels = np.array([level(_raw(one)) for one in recordings])
+        levels = np.array([level(one.electrodes) for one in recordings])
         low, middle, high = np.percentile(levels, [25, 50, 75], axis=0)
         return UnitRest(middle, (high - low) / 2, None, len(levels))
     levels, pressed = zip(*map(_least_pressed, recordings, pressures), strict=True)
@@ -81,13 +82,12 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
 def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
     """Read the rest of a unit from a recording of it untouched; columns : map of its columns, or None. Raises
     TactileError for a recording that is not raw, or in which an electrode moves more than drift does."""
-    recording = read(path, columns)
-    readings = _raw(recording)
+    recording = _raw(read(path, columns))
+    readings, pressure = recording.electrodes, recording.pdc
     spread = np.ptp(np.quantile(readings, [0.01, 0.99], axis=0), axis=0)
     if spread.max() > UNIT_DRIFT:
         found = f"E{spread.argmax() + 1} moves by {spread.max():.0f} counts"
         raise TactileError(path, found, f"an untouched finger, at most {UNIT_DRIFT:g}", "Record it without contact")
-    pressure = _pressure(recording)
     pdc = None if pressure is None else float(np.nanmedian(pressure))
     return UnitRest(level(readings), spread / 2, pdc, 0)
 
@@ -105,7 +105,7 @@ def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitR
     if contacts < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
         raise TactileError("rest of the unit", f"{contacts} recordings", f"at least {FEWEST}", advice)
-    readings = np.concatenate([_raw(one) for one in recordings])
+    readings = np.concatenate([_raw(one).electrodes for one in recordings])
     low, middle, high = np.quantile(readings, 1 - LEAST_LOADED * np.array([0.9, 0.5, 0.1]), axis=0)
     seen = readings[spread_out(len(readings), FRAMES)]
     moved = [_moved(seen, middle, simulated, film) for film in THICKNESSES]
@@ -132,25 +132,24 @@ def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: f
     return rest, share
 
 
-def _pressure(recording: Recording) -> np.ndarray | None:
-    """Return PDC (T,) counts, None if it was not recorded."""
-    return None if recording.pdc is None else in_counts(recording.pdc, 1.0, recording.sensor, [])
-
-
 def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the recording's level (19,) counts in its window of lowest pressure, and that pressure, counts of PDC.
     pdc : (T,) counts, the recording's fluid pressure"""
-    electrodes = _raw(recording)
+    electrodes = recording.electrodes
     n = min(window_frames(recording.rate), len(electrodes))
     windows = np.convolve(pdc, np.full(n, 1 / n), mode="valid")
     start = int(np.argmin(windows))
     return level(electrodes[start : start + n]), float(windows[start])
 
 
-def _raw(recording: Recording) -> np.ndarray:
-    """Return repaired counts (T, 19). Raises TactileError for a recording of another kind than raw counts."""
+def _raw(recording: Recording) -> Recording:
+    """Return the recording repaired, its electrodes and PDC in counts. Raises TactileError for one of another kind than
+    raw readings."""
     electrodes = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
+    unit, _ = full_scale(electrodes) or (1.0, "")
+    electrodes = unit * electrodes
     kind, evidence = detect(electrodes)
     if kind != "raw":
         raise TactileError(recording.path, f"a {kind} recording ({evidence})", "raw counts, which have a rest to find")
-    return electrodes
+    pdc = None if recording.pdc is None else in_counts(recording.pdc, unit, recording.sensor, [])
+    return replace(recording, electrodes=electrodes, pdc=pdc)

@@ -58,6 +58,17 @@ def test_an_untouched_finger_s_recording_is_its_rest_and_a_pressed_one_s_is_not(
             read_rest(str(tmp_path / f"{name}.npz"))
 
 
+@pytest.mark.parametrize("full", [3.3, 1023, 65535])
+def test_rest_of_readings_in_volts_or_of_other_bits_is_in_counts(full, tmp_path):
+    grips = [held(strength, seed, pdc=False) for seed, strength in enumerate([0.01, 0.02, 0.02, 0.5])]
+    scale = full / 4095
+    found = find_rest([dataclasses.replace(one, electrodes=scale * one.electrodes) for one in grips])
+    np.testing.assert_allclose(found.counts, find_rest(grips).counts, atol=1e-6)
+    still = np.rint(REST + np.random.default_rng(0).normal(0, 2, (300, 19)))
+    np.savez(tmp_path / "still.npz", electrodes=scale * still)
+    assert np.abs(read_rest(str(tmp_path / "still.npz")).counts - REST).max() < 1
+
+
 def test_too_few_and_rectified_recordings_are_refused():
     with pytest.raises(TactileError, match=r"2 recordings.*at least 3"):
         find_rest([held(0.1, 0), held(0.2, 1)])
