@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core import sensors
+from ...tactile_core.geometry.lattice import cap_faces, grid_faces
 from ...tactile_core.pictures.mitsuba.window import ACRYLIC
 from ..settings import properties
 from . import digit_materials, surfaces
@@ -55,20 +56,12 @@ def stack(part: dict[str, Any], middle: list[float], border: np.ndarray) -> tupl
         flat = outline + grown * outward + [0.0, shift]
         level = (base + height)[:, None]
         rings.append(np.hstack([level, flat] if along_x else [flat, level]))
-    count, index = len(outline), np.arange(len(outline))
-    after = np.roll(index, -1)
-    pairs = [(k, (k + 1) % len(rings)) for k in range(len(rings) - (not part.get("loop")))]
-    sides = [
-        np.stack([a * count + index, a * count + after, b * count + after, b * count + index], -1) for a, b in pairs
-    ]
-    quads = np.concatenate(sides)
-    faces, nodes = [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], np.concatenate(rings)
-    if not part.get("loop"):
-        ends = [rings[0].mean(0), rings[-1].mean(0)]
-        last = (len(rings) - 1) * count
-        faces += [np.stack([np.full(count, len(nodes)), after, index], -1),
-                  np.stack([np.full(count, len(nodes) + 1), last + index, last + after], -1)]  # fmt: skip
-        nodes = np.concatenate([nodes, ends])
+    count, loop, nodes = len(outline), bool(part.get("loop")), np.concatenate(rings)
+    faces = [grid_faces(len(rings) + loop, count, closed=True) % len(nodes)]
+    if not loop:
+        first, last = np.arange(count), len(nodes) - 1 - np.arange(count)
+        faces += [cap_faces(len(nodes), first), cap_faces(len(nodes) + 1, last)]
+        nodes = np.concatenate([nodes, [rings[0].mean(0), rings[-1].mean(0)]])
     triangles = np.concatenate(faces)
     a, b, c = nodes[triangles].transpose(1, 0, 2)
     inward = (a * np.cross(b, c)).sum() < 0  # as the rows go up or down

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...tactile_core.geometry.lattice import grid_faces
 from ..settings import properties
 from . import style_nodes, surfaces
 
@@ -106,8 +107,4 @@ def _upright() -> tuple[np.ndarray, np.ndarray]:
     around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     rings = [(0.0, 0.0), (0.12, 0.3), (0.05, 0.3), (0.05, 1.0), (0.0, 1.0)]  # radius and height
     nodes = np.concatenate([np.stack([r * np.cos(around), r * np.sin(around), 0 * around + h], -1) for r, h in rings])
-    index, count = np.arange(24), 24
-    after = np.roll(index, -1)
-    faces = [np.stack([a + k * count, b + k * count, c + k * count], -1) for k in range(len(rings) - 1)
-             for a, b, c in ((index, after + count, after), (index, index + count, after + count))]  # fmt: skip
-    return nodes, np.concatenate(faces)
+    return nodes, grid_faces(len(rings), len(around), closed=True)

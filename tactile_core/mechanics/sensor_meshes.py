@@ -171,7 +171,6 @@ def check_suffix(path: str | os.PathLike) -> None:
 
 def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
     """Write the resting sensor: its volume to ``.vtu``, its surface to ``.ply`` or ``.stl``. Raises what writers do."""
-    check_suffix(path)
     if Path(path).suffix.lower() == ".vtu":
         write_vtu(path, solid_mesh(sensor))
     else:

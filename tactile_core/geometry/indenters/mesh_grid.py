@@ -74,7 +74,8 @@ def _grid(mesh: Any, near: NearTriangles, where: str | os.PathLike, spacing: flo
     shape = _shape(extent, spacing)
     # The outermost node that is kept lies outside of the known box.
     origin = mesh.bounds[0] * 1e-3 - MARGIN - spacing * (1 + _SPARE)
-    distance = _signed(mesh, near, where, origin * 1e3, spacing * 1e3, shape) * 1e-3
+    within = inside(mesh.triangles, origin * 1e3, spacing * 1e3, shape, where)
+    distance = signed(near, origin * 1e3, spacing * 1e3, within) * 1e-3
     coefficients = scipy.ndimage.spline_filter(distance, order=3, output=np.float64, mode="mirror")
     kept = np.ascontiguousarray(coefficients[(slice(_SPARE, -_SPARE),) * 3], np.float32)
     return SplineGrid(origin + spacing * _SPARE, spacing, kept)
@@ -87,20 +88,6 @@ def _check_memory(where: str | os.PathLike, shape: tuple[int, ...], spacing: flo
         found = f"a grid of {np.prod(shape) / 1e6:.0f} million nodes with spacing_mm = {spacing * 1e3:g}"
         expected = f"at most {MAX_NODES // 10**6} million (32 MB)"
         raise TactileError(where, found, expected, f"Give it spacing_mm = {least:g}, or a narrower part")
-
-
-def _signed(
-    mesh: Any, near: NearTriangles, where: str | os.PathLike, origin: np.ndarray, spacing: float, shape: tuple[int, ...]
-) -> np.ndarray:
-    """Return the signed distance (shape) mm at nodes ``origin`` + spacing * (i, j, k), mm; others as in ``_grid``"""
-    try:
-        within = inside(mesh.triangles, origin, spacing, shape)
-    except OverlapError as overlap:
-        place = ", ".join(f"{x:.3g}" for x in overlap.place)
-        found = f"it crosses itself, or parts of it overlap, near ({place}) mm, scaled and turned"
-        expected = "a surface that does not cross itself"
-        raise TactileError(where, found, expected, "Unite its parts (boolean union)") from None
-    return signed(near, origin, spacing, within)
 
 
 def error_of(
@@ -177,19 +164,13 @@ def _nodes(flat: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.stack(np.unravel_index(flat, shape), axis=-1)
 
 
-class OverlapError(Exception):
-    """Error for a mesh that overlaps itself: a column enters it twice before it leaves, near ``place`` (3,)."""
-
-    def __init__(self, place: np.ndarray) -> None:
-        super().__init__(place)
-        self.place = place
-
-
-def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]) -> np.ndarray:
+def inside(
+    triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...], where: str | os.PathLike
+) -> np.ndarray:
     """Mark (shape) bool which nodes at ``origin`` + spacing * (i, j, k) lie inside the mesh of triangles (m, 3, 3), all
-    in one unit of length. shape : numbers of nodes along x, y, z
+    in mm. shape : numbers of nodes along x, y, z; where : names the mesh in the message
     Along each column the crossings must alternate between entering and leaving. If they do not, as where a column
-    grazes an edge, columns beside it are tried; then raises OverlapError."""
+    grazes an edge, columns beside it are tried; then raises TactileError: the mesh overlaps itself."""
     for beside in _BESIDE:
         column, height, entering = _crossings(triangles, origin + spacing * np.array([*beside, 0]), spacing, shape)
         order = np.lexsort((height, column))
@@ -204,7 +185,9 @@ def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tup
             return (np.cumsum(change, axis=1, dtype=np.int8)[:, :-1] > 0).reshape(shape)
     first = int(np.flatnonzero(wrong)[0])
     across = np.array(divmod(column[first], shape[1]))
-    raise OverlapError(np.append(origin[:2] + spacing * across, height[first]))
+    place = ", ".join(f"{x:.3g}" for x in (*(origin[:2] + spacing * across), height[first]))
+    found = f"it crosses itself, or parts of it overlap, near ({place}) mm, scaled and turned"
+    raise TactileError(where, found, "a surface that does not cross itself", "Unite its parts (boolean union)")
 
 
 def _crossings(

@@ -118,14 +118,10 @@ def solid_mesh(sensor: str) -> HexMesh:
 @functools.cache
 def glued_skin(sensor: str = sensors.SOURCE) -> np.ndarray:
     """Mark (stations, columns) bool the inner points of the skin's grid that lie on or in the core, or at its ends."""
-    inner = sensors.skin_of(sensor).skin_grid("inner")
-    return _on_core(sensor, inner.reshape(-1, 3)).reshape(inner.shape[:2])
-
-
-def _on_core(sensor: str, inner: np.ndarray) -> np.ndarray:
     skin = sensors.skin_of(sensor)
-    held = skin.descriptor.core
-    x, y, z = inner.T
+    inner, held = skin.skin_grid("inner"), skin.descriptor.core
+    x, y, z = inner.reshape(-1, 3).T
     radius = np.hypot(y - skin.axis_y, z)
-    core = skin.core_radius(x, np.arctan2(z, skin.axis_y - y))
-    return (np.nan_to_num(core, nan=-1.0) >= radius - held.attached) | (x > held.base_cap_x) | (x < held.tip_cap_x)
+    core = np.nan_to_num(skin.core_radius(x, np.arctan2(z, skin.axis_y - y)), nan=-1.0)
+    glued = (core >= radius - held.attached) | (x > held.base_cap_x) | (x < held.tip_cap_x)
+    return glued.reshape(inner.shape[:2])

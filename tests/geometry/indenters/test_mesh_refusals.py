@@ -9,7 +9,7 @@ import trimesh
 from tactile_core.errors import TactileError
 from tactile_core.files.array_cache import cache_folder
 from tactile_core.geometry.indenters import MeshIndenter, mesh_file
-from tactile_core.geometry.indenters.mesh_grid import OverlapError, inside
+from tactile_core.geometry.indenters.mesh_grid import inside
 
 
 def sphere(radius=2.0, at=(0, 0, 0)):
@@ -164,12 +164,12 @@ def test_files_that_a_mesh_names_are_not_opened(tmp_path):
 def test_inside_counts_layers():
     """A box whose faces lie exactly on grid nodes, then the same box twice."""
     box = trimesh.creation.box((2, 2, 2)).triangles
-    within = inside(box, np.full(3, -1.5), 0.5, (7, 7, 7))
+    within = inside(box, np.full(3, -1.5), 0.5, (7, 7, 7), "box")
     sure = np.abs(np.arange(7) * 0.5 - 1.5) < 0.9
     assert within[np.ix_(sure, sure, sure)].all()
     assert not within[[0, -1]].any() and not within[:, [0, -1]].any() and not within[:, :, [0, -1]].any()
-    with pytest.raises(OverlapError):
-        inside(np.concatenate([box, box]), np.full(3, -1.5), 0.5, (7, 7, 7))
+    with pytest.raises(TactileError, match="crosses itself"):
+        inside(np.concatenate([box, box]), np.full(3, -1.5), 0.5, (7, 7, 7), "box")
 
 
 def test_a_binary_stl_that_is_cut_short_says_so(tmp_path):
