@@ -134,14 +134,11 @@ def mended(
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
         if kind == "raw" and np.isfinite(recording.time).all():  # others may stand still, and snapshots be alike
-            again, long = _stale(recording, readings, warnings)
+            (again, long), faded = _stale(recording, readings, warnings), faded_ends(readings)
             flags = flags | np.where(again, Flag.REPAIRED, 0).astype(np.uint16)
-            flags |= np.where(long, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
-            unreadable |= again[:, None]
-            faded = faded_ends(readings)
+            flags |= np.where(long | faded, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
+            unreadable |= (again | faded)[:, None]
             if faded.any():
-                flags |= np.where(faded, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
-                unreadable |= faded[:, None]
                 warnings.append(
                     f"{faded.sum()} rows at the ends fade to half of their neighbours, all electrodes alike: averaged "
                     "with zeros beyond the ends? Not believed; average with the ends repeated, or not at all"

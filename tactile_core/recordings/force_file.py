@@ -40,9 +40,10 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
     if not all(picked):
         found, advice = f"{named!r:.80}, neither a file nor columns of {path}", "Check the path, or their names"
         raise TactileError("--force", found, "the force of a recording", advice)
-    columns = table.columns([column for each in picked for column in each] if own else list(table.header))
+    chosen = [column for each in picked for column in each] if own else list(table.header)
+    columns = table.columns(chosen)
     timed = not own and columns.shape[1] in (2, 4)
-    for name in table.header[int(timed) :] if not own else [column for each in picked for column in each]:
+    for name in chosen[int(timed) :]:
         if OTHER_UNIT.search(name):
             raise TactileError(where, f"a column {name!r}", "newtons", "Convert it, and name the column after them")
     size = _size(where, columns[:, int(timed) :], table.lines)
