@@ -97,12 +97,9 @@ class Store:
             raise TactileError(where, f"shape {found}", wanted)
         bytes_needed = int(np.prod([float(n) for n in found])) * max(kind.itemsize, np.dtype(dtype).itemsize)
         if bytes_needed > MAX_BYTES or (found and found[0] > MAX_FRAMES):
-            raise TactileError(
-                where,
-                f"shape {found}, {bytes_needed / 2**30:.1f} GB in memory",
-                f"at most {MAX_FRAMES:,} frames and {MAX_BYTES / 2**30:.0f} GB",
-                "Split the recording",
-            )
+            held = f"shape {found}, {bytes_needed / 2**30:.1f} GB in memory"
+            expected = f"at most {MAX_FRAMES:,} frames and {MAX_BYTES / 2**30:.0f} GB"
+            raise TactileError(where, held, expected, "Split the recording")
         return self._loaded(name).astype(dtype, copy=False)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:

@@ -248,9 +248,6 @@ def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_wo
     frames, count = len(bad), int(bad.sum())
     if count > max(1, MAX_BAD_SHARE * frames) or count == frames:
         first = next(p for p in problems if p.essential)
-        raise BadRows(
-            f"{path}, {row_word} {first.row}, {first.field}",
-            f"{first.found}; {count} of {frames} rows are bad",
-            f"at most {MAX_BAD_SHARE:.0%} of the rows",
-            "Check the export of this file",
-        )
+        where = f"{path}, {row_word} {first.row}, {first.field}"
+        found = f"{first.found}; {count} of {frames} rows are bad"
+        raise BadRows(where, found, f"at most {MAX_BAD_SHARE:.0%} of the rows", "Check the export of this file")

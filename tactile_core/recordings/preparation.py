@@ -216,12 +216,8 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
         return find_quiet(readings, recording.pdc, recording.rate, kind)
     if options.tare == "none":
         if kind == "raw":
-            raise TactileError(
-                "option tare",
-                "'none' for a raw recording, which has no zero of its own",
-                "frames A:B",
-                "Name frames without contact, or leave the option out",
-            )
+            found, advice = "'none' for a raw recording, which has no zero of its own", "Name frames without contact"
+            raise TactileError("option tare", found, "frames A:B", f"{advice}, or leave the option out")
         return Quiet(np.zeros(len(readings), bool), (), "the file's own zero, as asked for")
     frames = tare_frames(options.tare, len(readings))
     mask = np.zeros(len(readings), bool)

@@ -241,10 +241,7 @@ def tare_frames(asked: slice | str, count: int) -> slice:
     first = 0 if tare.start is None else tare.start + (count if tare.start < 0 else 0)
     last = count if tare.stop is None else tare.stop + (count if tare.stop < 0 else 0)
     if tare.step not in (None, 1) or not 0 <= first < last <= count:
-        raise TactileError(
-            "option tare",
-            f"frames {asked if isinstance(asked, str) else f'{tare.start}:{tare.stop}'}",
-            f"A:B inside {count} frames, without a step",
-            "Name frames without contact",
-        )
+        found = asked if isinstance(asked, str) else f"{tare.start}:{tare.stop}"
+        expected = f"A:B inside {count} frames, without a step"
+        raise TactileError("option tare", f"frames {found}", expected, "Name frames without contact")
     return slice(first, last)

@@ -59,10 +59,8 @@ def detect(electrodes: np.ndarray) -> tuple[str, str]:
     numbers = "whole numbers" if whole > WHOLE_SHARE else f"{1 - whole:.0%} fractions"
     span = f"{numbers} from {low:.4g} to {high:.4g}"
     if np.sum(levels > RAW_LEVEL) > len(levels) // 2:
-        return (
-            "raw",
-            f"{span}; medians of the electrodes {levels.min():.0f} to {levels.max():.0f} counts, far above any change",
-        )
+        rests = f"medians of the electrodes {levels.min():.0f} to {levels.max():.0f} counts"
+        return "raw", f"{span}; {rests}, far above any change"
     if whole <= WHOLE_SHARE and max(abs(low), abs(high)) <= SCALED_LIMIT:
         return "scaled", f"{span}, too small for counts"
     if negative > NEGATIVE_SHARE:

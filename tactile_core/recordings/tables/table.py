@@ -193,12 +193,10 @@ def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_o
 
 def _check_problems(path: str, problems: list[Problem], line: int) -> None:
     if len(problems) > MAX_PROBLEMS:
-        raise TactileError(
-            f"{path}, line {problems[0].row}, {problems[0].field}",
-            f"{problems[0].found}; more than {MAX_PROBLEMS:,} bad cells up to line {line}",
-            "numbers",
-            "Check the export of this file",
-        )
+        first = problems[0]
+        found = f"{first.found}; more than {MAX_PROBLEMS:,} bad cells up to line {line}"
+        where = f"{path}, line {first.row}, {first.field}"
+        raise TactileError(where, found, "numbers", "Check the export of this file")
 
 
 def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
@@ -267,12 +265,8 @@ def text_lines(path: str, data: bytes) -> list[str]:
     try:
         text = unquoted(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise TactileError(
-            f"{path}, byte {error.start}",
-            "not UTF-8 text",
-            "a CSV, HDF5, NPZ or MATLAB 5 recording",
-            "Save a text file as UTF-8",
-        ) from None
+        where, advice = f"{path}, byte {error.start}", "Save a text file as UTF-8"
+        raise TactileError(where, "not UTF-8 text", "a CSV, HDF5, NPZ or MATLAB 5 recording", advice) from None
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if max(map(len, lines)) > MAX_LINE:
         raise TactileError(path, f"a line of over {MAX_LINE // 2**20} MB", "a line for each frame")
