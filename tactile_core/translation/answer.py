@@ -26,7 +26,7 @@ class Answer:
     kind : "likely", the most plausible contact, or "mean", of all plausible ones, which may resemble none of them
     frames_apart : true estimates each frame from its own signals; false tracks the contact through all frames
     mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: where on it the BioTac is mounted
-    samples : number of contacts drawn for each frame from its posterior
+    samples : number of contacts that `tactile convert` and `batch` draw for each frame from its posterior
     contacts : 1, or 2 to look for a second in each frame. Use 2 only if there may be two: on a real unit a single wide
         contact is often taken for two"""
 

@@ -139,6 +139,9 @@ def translate(
         if not isinstance(given, kind):
             advice = "tactile.read reads a file; numpy.savez writes arrays to one" * (kind is Recording)
             raise TactileError(f"translate, {name}", f"a {type(given).__name__}", f"a {kind.__name__}", advice)
+    if answer.samples:
+        advice = "`tactile convert --samples` draws them"
+        raise TactileError("translate, answer", f"{answer.samples} samples", "none", advice)
     recording.check()  # before its length is asked for
     try:
         chosen = np.arange(len(recording))[frames]

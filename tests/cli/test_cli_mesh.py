@@ -130,6 +130,7 @@ def test_the_fast_tier_writes_a_real_contact(mesh, tmp_path):
         (["--out", "a.ply", "--frames", "f.h5", "--frame", "3", "--press", "sphere"], "one of the two"),
         (["--out", "a.ply", "--depth-mm", "1"], "--depth-mm: given without --press"),
         (["--out", "a.ply", "--tier", "full"], "--tier: given without --press"),
+        (["--out", "a.ply", "--z-mm", "2"], "--z-mm: given without --press"),
         (["--out", "a.ply", "--press", "sphere", "--diameter", "7"], "how far or how hard"),
         (["--out", "a.ply", "--press", "sphere", "--depth-mm", "1"], "no --diameter"),
         (["--out", "a.ply", "--press", "sphere", "--diameter", "nan", "--depth-mm", "1"], "sphere, radius"),

@@ -57,6 +57,7 @@ def test_what_is_no_recording_is_refused_with_the_way_to_read_one(given):
     [
         ({"prepare": {"smooth": 3}}, "translate, prepare: a dict; expected a PrepareOptions"),
         ({"answer": "mean"}, "translate, answer: a str"),
+        ({"answer": Answer(samples=8)}, "translate, answer: 8 samples"),
         ({"prepare": PrepareOptions(tare=(0, 20))}, r"option tare: \(0, 20\); expected frames A:B"),
         ({"prepare": PrepareOptions(smooth="3")}, "option smooth: '3' frames; expected an odd number"),
         ({"prepare": PrepareOptions(counts_per_unit="1")}, "option counts_per_unit: '1'; expected counts a unit"),

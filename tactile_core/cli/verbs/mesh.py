@@ -53,12 +53,11 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     press.add_argument(
         "--x-mm",
         type=float,
-        default=-8.0,
         metavar="MM",
         help="place along the DIGIT's plane, onto which the BioTac rolls (default: -8, the middle)",
     )
-    press.add_argument("--z-mm", type=float, default=0.0, metavar="MM", help="place across the finger (default: 0)")
-    press.add_argument("--tilt-deg", type=float, default=0.0, metavar="DEG", help="angle off the normal (default: 0)")
+    press.add_argument("--z-mm", type=float, metavar="MM", help="place across the finger (default: 0)")
+    press.add_argument("--tilt-deg", type=float, metavar="DEG", help="angle off the normal (default: 0)")
     press.add_argument("--tier", choices=TIERS, help="solver; takes milliseconds, seconds or minutes (default: fast)")
 
 
@@ -96,11 +95,11 @@ def _check(options: argparse.Namespace) -> None:
         raise TactileError("--press", "given with --frames", "one of the two")
     if (options.frames is None) != (options.frame is None):
         raise TactileError("--frames and --frame", "one of them alone", "both", "Say which frame of which file")
-    of_press = "diameter", "indenter", "depth_mm", "force_n", "tier"
+    of_press = "diameter", "indenter", "depth_mm", "force_n", "x_mm", "z_mm", "tilt_deg", "tier"
     given = [name for name in of_press if getattr(options, name) is not None]
     if given and not options.press:
         raise TactileError("--" + given[0].replace("_", "-"), "given without --press", "--press WHAT")
-    if not abs(options.tilt_deg) <= MOST_TILT:  # nan, too
+    if options.tilt_deg is not None and not abs(options.tilt_deg) <= MOST_TILT:  # nan, too
         raise TactileError("--tilt-deg", f"{options.tilt_deg:g}", f"-{MOST_TILT:g} to {MOST_TILT:g}, as in scenes")
     if options.press and (options.depth_mm is None) == (options.force_n is None):
         advice = "Say how far or how hard"
@@ -143,7 +142,8 @@ def _pressed(options: argparse.Namespace, indenter: Indenter) -> Solution:
     from ...mechanics.placement import Placement
     from ...mechanics.solve import solve
 
-    place = Placement(options.x_mm * 1e-3, options.z_mm * 1e-3, math.radians(options.tilt_deg))
+    x_mm = -8.0 if options.x_mm is None else options.x_mm  # the middle
+    place = Placement(x_mm * 1e-3, (options.z_mm or 0.0) * 1e-3, math.radians(options.tilt_deg or 0.0))
     depth = None if options.depth_mm is None else options.depth_mm * 1e-3
     tier = options.tier or "fast"
     if tier != "fast" and sys.stderr.isatty():
