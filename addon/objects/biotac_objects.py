@@ -35,8 +35,8 @@ def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensor
     return skin
 
 
-def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.Object:
-    """Add children to the skin: the rigid core under its pad, and bone and nail, which hold it; return the core."""
+def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> None:
+    """Add children to the skin: the rigid core under its pad, and bone and nail, which hold it."""
     sensor = properties.sensor_name(skin)
     shape = sensors.skin_of(sensor)
     known = shape.descriptor.core
@@ -56,4 +56,3 @@ def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.O
     core.parent = skin
     surfaces.paint(core, CORE_COLOUR)
     sensor_bodies.add_parts(skin)
-    return core

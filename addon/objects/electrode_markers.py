@@ -15,7 +15,7 @@ _REST = np.array([0.85, 0.85, 0.85])
 _HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film thinner, film thicker
 
 
-def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> list[bpy.types.Object]:
+def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:
     """Add the markers E1, E2, ..., in place of former ones; red while a reading is above rest, blue while below.
 
     change : (T, e) counts against rest; the largest has the strongest colour; frames : (T,) of the scene"""
@@ -23,7 +23,6 @@ def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) 
         bpy.data.objects.remove(old)
     colours = colours_of(change)
     ball = _ball(skin.tactile.per_metre)
-    markers = []
     places = sensors.electrodes(properties.sensor_name(skin))
     for k, place in enumerate(axes.to_blender(places, skin.tactile.per_metre)):
         marker = bpy.data.objects.new(f"E{k + 1}", ball)
@@ -33,8 +32,6 @@ def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) 
             surfaces.paint(marker, (*_REST, 1.0))
         marker.color = (*colours[0, k], 1.0)
         curves.write_curves(marker, "color", frames, colours[:, k])
-        markers.append(marker)
-    return markers
 
 
 def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:

@@ -6,6 +6,7 @@ import zlib
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ...tactile_core import sensors
 from ...tactile_core.files.png_writer import png_file
@@ -68,8 +69,9 @@ def show(gel: bpy.types.Object, kind: str, values: np.ndarray) -> bpy.types.Imag
     return image
 
 
-def pack() -> None:
-    """Pack pictures and height maps, so that a saved file holds them as they are."""
+@persistent
+def pack(*_: object) -> None:
+    """Pack pictures and height maps, so that a saved file holds them as they are; Blender calls it before a save."""
     for image in {getattr(thing.tactile, kind) for thing in bpy.data.objects for kind in _NAMES} - {None}:
         # Blender 5.0 empties an image that is packed again without a change.
         if image.packed_file is None or image.is_dirty:

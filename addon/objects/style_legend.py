@@ -29,8 +29,8 @@ def remove_legend(thing: bpy.types.Object) -> None:
         bpy.data.objects.remove(part)
 
 
-def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> bpy.types.Object:
-    """Give a sensor a card with a colour bar and a scale bar of 5 mm, which works without the add-on, and return it.
+def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> None:
+    """Give a sensor a card with a colour bar and a scale bar of 5 mm, which works without the add-on.
 
     style : whose colours the bar shows; title : what the colours say
     ends : texts at the bar's left and right end, None for no bar
@@ -75,7 +75,6 @@ def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str,
     low, high = corners.min(0), corners.max(0)
     style_nodes.set_input(modifier, _MIDDLE, tuple((low + high) / 2))
     style_nodes.set_input(modifier, _HALF, tuple((high - low) / 2 + _GAP * unit))
-    return legend
 
 
 def _facing() -> bpy.types.NodeTree:

@@ -63,7 +63,7 @@ def style_of(thing: bpy.types.Object) -> str:
     return next((name for name in names if shown is not None and shown == style_nodes.group(name)), "NONE")
 
 
-def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
+def add_arrow(sensor: bpy.types.Object, length: float) -> None:
     """Add an arrow to a sensor, as its child, that shows its custom property ``force``; it works without the add-on.
 
     length : of an arrow for 1 N, in the object's units
@@ -80,7 +80,6 @@ def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
         driver.type = "SUM"
         variable = driver.variables.new()
         variable.targets[0].id, variable.targets[0].data_path = sensor, f'["force"][{axis}]'
-    return arrow
 
 
 def arrow_of(sensor: bpy.types.Object) -> bpy.types.Object | None:

@@ -38,7 +38,7 @@ class JobOperator(TactileOperator):
                 self._job.wait()
             self.finish(context)
         finally:
-            self._close(context)
+            self.cancel(context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the job from the window; Blender stays usable while it runs."""
@@ -48,7 +48,7 @@ class JobOperator(TactileOperator):
                 if self._job is None:
                     self.finish(context)
         except Refused:
-            self._close(context)
+            self.cancel(context)
             return {"CANCELLED"}
         if self._job is None:
             return {"FINISHED"}
@@ -61,7 +61,7 @@ class JobOperator(TactileOperator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Handle an event: Esc stops the job, the timer's polls it; Blender calls this."""
         if event.type == "ESC":
-            self._close(context)
+            self.cancel(context)
             self.report({"WARNING"}, self.stopped)
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -78,18 +78,15 @@ class JobOperator(TactileOperator):
                 if over:
                     self.finish(context)
         except Refused:
-            self._close(context)
+            self.cancel(context)
             return {"CANCELLED"}
         if over:
-            self._close(context)
+            self.cancel(context)
             return {"FINISHED"}
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop the job when Blender closes or another file is opened."""
-        self._close(context)
-
-    def _close(self, context: bpy.types.Context) -> None:
+        """Stop the job and remove its files; Blender calls it too, when it closes or another file is opened."""
         if self._job is not None:
             self._job.cancel()
             self._job = None

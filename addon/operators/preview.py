@@ -87,19 +87,8 @@ def _undone(*_: object) -> None:
 
 
 @persistent
-def _end(*_: object) -> None:
-    """Switch Live Picture off; Blender calls this before it opens another file."""
-    switch_off()
-
-
-@persistent
-def _keep_images(*_: object) -> None:
-    """Pack pictures into the file; Blender calls this before it saves."""
-    images.pack()
-
-
-def switch_off() -> None:
-    """Switch Live Picture off, and end the workers that draw for it."""
+def switch_off(*_: object) -> None:
+    """Switch Live Picture off, and end the workers that draw for it; Blender calls this before it opens a file."""
     global _live
     _live = False
     tracer_process.close_all()
@@ -135,7 +124,7 @@ def unregister() -> None:
 
 CLASSES = (TACTILE_OT_live_picture,)
 HANDLERS = (
-    (bpy.app.handlers.save_pre, _keep_images), (bpy.app.handlers.load_pre, _end),
+    (bpy.app.handlers.save_pre, images.pack), (bpy.app.handlers.load_pre, switch_off),
     (bpy.app.handlers.load_post, _opened), (bpy.app.handlers.undo_post, _undone),
     (bpy.app.handlers.redo_post, _undone), (bpy.app.handlers.frame_change_post, _frame_changed),
     (bpy.app.handlers.depsgraph_update_post, _changed),

@@ -93,7 +93,7 @@ def _translator(weights: str, source: str | None, answer: Answer, _changed: int)
 def translator_of(asked: RecordingOptions, path: str) -> Translator:
     """Return the networks in the folder that the options ``asked`` name, else those that ship for the sensor of the
     recording ``path``. Raises TactileError if there are none."""
-    folder = _absolute(asked.weights)
+    folder = bpy.path.abspath(asked.weights)
     source = None if folder else readers.sensor_of_first([path])
     answer = Answer(frames_apart=asked.apart, contacts=2 if asked.two else 1)
     return _translator(folder, source, answer, _changed(os.path.join(folder, CARD_NAME)) if folder else 0)
@@ -115,16 +115,12 @@ def fingers(path: str) -> list[str]:
 def write_columns(path: str, asked: RecordingOptions) -> str:
     """Guess which columns of the recording ``path`` are what, and write that map to the file asked.columns if it is
     missing; return a sentence that says so, "" if nothing was written."""
-    file = _absolute(asked.columns)
+    file = bpy.path.abspath(asked.columns)
     if not file or os.path.lexists(file):
         return ""
     with opened(path) as (container, where, _, stream):
         column_map.write(file, *guess_map(where, container, stream))
     return f"{file}: written, guessed from names and values; check it"
-
-
-def _absolute(path: str) -> str:
-    return bpy.path.abspath(path) if path else ""
 
 
 def _changed(path: str) -> int:
@@ -146,7 +142,8 @@ def load(
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32
     known = translator_of(asked, path)
-    files = [(file, _changed(file)) for file in (split(path).file, _absolute(asked.columns), _absolute(asked.unit))]
+    named = split(path).file, *map(bpy.path.abspath, (asked.columns, asked.unit))
+    files = [(file, _changed(file)) for file in named]
     options = asked.tare, asked.frames, asked.polarity, known.answer, known.sha256
     key = (path, *files, *options, per_metre, kept_files.folder(kept_files.CACHE))
     if key not in _KEPT or not _KEPT[key].fits(motion):
@@ -167,7 +164,7 @@ def _translated(
     motion: str,
     key: tuple,
 ) -> Translated:
-    columns = _absolute(asked.columns)
+    columns = bpy.path.abspath(asked.columns)
     recording = recording_reader.read(path, translator.source, columns)
     if np.isnan(recording.time).all() and translator.answer.follows:
         found, advice = "snapshots, which do not follow each other", "Choose Each Frame Alone"
@@ -176,7 +173,7 @@ def _translated(
     if asked.unit:
         from ...tactile_core.recordings import electrode_gains  # reads by msgspec, which the wheels bring
 
-        file = _absolute(asked.unit)
+        file = bpy.path.abspath(asked.unit)
         unit = electrode_gains.read(file).gains_for(path, recording.section, file, recording.sensor)
     chosen = results.select(results.parse_frames(asked.frames), len(recording))
     tare = None if asked.tare in ("", "auto") else asked.tare

@@ -141,19 +141,16 @@ def _specs(things, sensor, context, meshes: dict[str, bytes]) -> list:  # noqa: 
     meshes : gets file name -> content of each mesh that a spec names"""
     import msgspec
 
-    specs = [_spec(thing, sensor, context, meshes) for thing in things]
+    specs, depsgraph = [], context.evaluated_depsgraph_get()
+    for thing in things:
+        spec, content = indenter_objects.spec_of(thing, indenter_objects.world_axes(thing, sensor), depsgraph)
+        specs.append(spec)
+        if content is not None:
+            meshes[spec.file] = content
     names = [spec.name for spec in specs]
     own = [bpy.path.clean_name(thing.name) if names.count(thing_name) > 1 else thing_name
            for thing, thing_name in zip(things, names, strict=True)]  # fmt: skip
     return [msgspec.structs.replace(spec, name=name) for spec, name in zip(specs, own, strict=True)]
-
-
-def _spec(thing, sensor, context, meshes: dict[str, bytes]) -> Any:  # noqa: ANN001
-    relative = indenter_objects.world_axes(thing, sensor)
-    spec, content = indenter_objects.spec_of(thing, relative, context.evaluated_depsgraph_get())
-    if content is not None:
-        meshes[spec.file] = content
-    return spec
 
 
 def _path(context, thing, sensor, whole: bool) -> tuple[np.ndarray, dict[str, np.ndarray]]:  # noqa: ANN001

@@ -112,14 +112,13 @@ def open_tab(context: bpy.types.Context) -> None:
 
     Older Blenders let no script choose a tab. There, this tab is made the first, on which a new sidebar opens.
     """
-    for area in context.window.screen.areas if context.window else ():
-        if area.type == "VIEW_3D":
-            area.spaces.active.show_region_ui = True
-            for region in (region for region in area.regions if region.type == "UI"):
-                try:
-                    region.active_panel_category = TAB
-                except (AttributeError, TypeError):
-                    _stand_first()
+    for area, _ in _main_regions(context, "VIEW_3D"):
+        area.spaces.active.show_region_ui = True
+        for region in (region for region in area.regions if region.type == "UI"):
+            try:
+                region.active_panel_category = TAB
+            except (AttributeError, TypeError):
+                _stand_first()
 
 
 class TACTILE_PT_first(bpy.types.Panel):
@@ -206,9 +205,8 @@ def look_at(context: bpy.types.Context, things: Sequence[bpy.types.Object]) -> N
 
 def colour_by(context: bpy.types.Context, kind: str) -> None:
     """Let Solid views colour by object (``kind`` "OBJECT"), or by a surface's style if it has one ("VERTEX")."""
-    for area in context.window.screen.areas if context.window else ():
-        if area.type == "VIEW_3D":
-            area.spaces.active.shading.color_type = kind
+    for area, _ in _main_regions(context, "VIEW_3D"):
+        area.spaces.active.shading.color_type = kind
 
 
 def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> None:

@@ -112,12 +112,11 @@ def _folder(out: Path, path: Path) -> Path:
     return out / (path.parent.resolve().name if path.name == "scene.toml" else path.resolve().stem)
 
 
-def _claimed(folder: Path, options: argparse.Namespace) -> Path:
-    """Make the folder of a result and return it; raises TactileError if it holds files, unless they may go."""
+def _claimed(folder: Path, options: argparse.Namespace) -> None:
+    """Make the folder of a result; raises TactileError if it holds files, unless they may go."""
     if folder.exists() and any(folder.iterdir()) and not options.overwrite:
         raise TactileError(folder, "already holds something", "a new folder", "Add --overwrite, or another --out")
     folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:

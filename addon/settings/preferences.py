@@ -22,12 +22,6 @@ def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences 
     return None if known is None else known.preferences
 
 
-def default_calibration(context: bpy.types.Context) -> str:
-    """Return the calibration file for scenes that name none, set in the preferences; "" for the one that ships."""
-    chosen = addon_preferences(context)
-    return "" if chosen is None else chosen.calibration
-
-
 class TACTILE_OT_clear_cache(TactileOperator):
     """Remove what was computed once for all simulations and is computed again, in minutes, where it is missing"""
 

@@ -167,11 +167,6 @@ def surface_of(thing: bpy.types.Object) -> Lattice:
     return sensors.sensor_surface(sensor_name(thing))
 
 
-def role_of(sensor: str) -> str:
-    """Return "DIGIT" for a gel, else "BIOTAC". Raises TactileError for unknown sensors."""
-    return "DIGIT" if sensors.is_gel(sensor) else "BIOTAC"
-
-
 def sensor_items(gels_only: bool = False) -> list[tuple[str, str, str]]:
     """List the sensors with a descriptor as a menu's items, BioTac and DIGIT first. gels_only : leaves others out"""
     return _items(descriptor.names(), gels_only)

@@ -37,8 +37,9 @@ def calibration_of(scene: bpy.types.Scene, sensor: str, size: tuple[int, int] | 
     Raises TactileError for a bad file, and for a file of a sensor of which the scene has no gel.
     """
     path = scene.tactile_render.calibration
-    if not path and sensor == sensors.TARGET:
-        path = preferences.default_calibration(bpy.context)
+    chosen = preferences.addon_preferences(bpy.context)
+    if not path and sensor == sensors.TARGET and chosen is not None:
+        path = chosen.calibration
     file = bpy.path.abspath(path) if path else None
     gels = {properties.sensor_name(thing) for thing in scene.objects if thing.tactile.role == "DIGIT"}
     try:

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ...tactile_core import sensors
 from ...tactile_core.geometry.indenters.indenter import forms
 from ..objects import axes, biotac_objects, digit_body, digit_objects, indenter_objects
 from ..operators import view
@@ -30,22 +31,22 @@ class TACTILE_OT_add_sensor(TactileOperator):
     def _work(self, context: bpy.types.Context) -> None:
         scene = context.scene
         name = self.sensor.lower()
-        role = properties.role_of(name)
+        is_gel = sensors.is_gel(name)
         properties.check_absent(scene, name)
         view.hide_untouched(scene)
         if self.millimetres:
             view.use_millimetres(self, scene)
         group, per_metre = context.collection, axes.units_per_metre(scene)
-        if role == "BIOTAC":
+        if is_gel:
+            thing = digit_objects.add_gel(group, per_metre, properties.of_role(scene, "BIOTAC"), name)
+            digit_body.add_body(thing, render_settings.calibration_of(scene, name))
+        else:
             thing = biotac_objects.add_skin(group, per_metre, name)
             biotac_objects.add_core(group, thing)
             gel = properties.of_role(scene, "DIGIT")
             if gel is not None:
                 thing.location = gel.location
                 thing.location.y -= digit_objects.BESIDE * per_metre
-        else:
-            thing = digit_objects.add_gel(group, per_metre, properties.of_role(scene, "BIOTAC"), name)
-            digit_body.add_body(thing, render_settings.calibration_of(scene, name))
         view.show(context, [thing])
 
 

@@ -25,7 +25,7 @@ def test_off_leaves_nothing_and_on_again_is_whole(extension, part):
     view.unregister()  # what a test before may have opened
     before = known(extension)
     functions, properties, classes = before
-    assert {name.rpartition(".")[2] for name in functions} >= {"_menu", "_menu_import", "_menu_export", "_keep_images"}
+    assert {name.rpartition(".")[2] for name in functions} >= {"_menu", "_menu_import", "_menu_export", "pack"}
     assert properties == ["tactile", "tactile_render"] and "TACTILE_PT_recording" in classes
     view._stand_first()  # for two seconds a class more, as where the tab is opened in an older Blender
     extension.unregister()
