@@ -98,7 +98,7 @@ def test_one_bad_recording_is_named_and_the_others_go_on(tactile, slide_csv, tmp
         (["--keep", "pictures"], "--keep"),
         (["--tare", "soon"], "tare"),
         (["--tare", "100:5000"], "tare"),
-        (["--frames", "900:"], "none of the 150 frames"),
+        (["--frames", "900:"], "--frames: 900: takes none of the 150 frames; expected indices from 0"),
     ],
 )
 def test_bad_options_end_in_one_message(arguments, words, tactile, slide_csv, tmp_path):

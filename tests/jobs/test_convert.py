@@ -162,19 +162,11 @@ def test_the_note_tells_what_is_reproducible_and_no_path(run, slide_csv, tmp_pat
     assert set(timings["ms_a_frame"]) == set(timings["cpu_ms_a_frame"]) == stages
 
 
-def test_the_note_names_the_calibration_that_was_given(slide_csv, tmp_path, tools, no_sheet):
-    unit = tmp_path / "unit.toml"
-    unit.write_bytes(b"# a unit's")
-    given = dataclasses.replace(tools, calibration=str(unit))
-    note = json.loads((converted(slide_csv(frames=5), tmp_path / "out", given) / "note.json").read_text())
-    assert note["calibration"] == {"file": "unit.toml", "sha256": hashlib.sha256(b"# a unit's").hexdigest()}
-
-
 def test_a_recording_that_goes_while_it_is_converted_costs_nothing(slide_csv, tmp_path, tools, no_sheet):
-    """A stick that is pulled, or a file that grows: the note tells what was read."""
+    """A stick that is pulled, or a file that grows: the note tells what was read, and the calibration given."""
     path, unit = slide_csv(frames=5), tmp_path / "unit.toml"
     unit.write_bytes(b"# a unit's")
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    digest, units = (hashlib.sha256(file.read_bytes()).hexdigest() for file in (path, unit))
 
     def go(done, total):
         path.unlink()
@@ -182,7 +174,8 @@ def test_a_recording_that_goes_while_it_is_converted_costs_nothing(slide_csv, tm
 
     given = dataclasses.replace(tools, calibration=str(unit))
     folder = convert.convert(path, tmp_path / "out", convert.Options(), given, go).folder
-    assert json.loads((folder / "note.json").read_text())["recording"]["sha256"] == digest
+    note = json.loads((folder / "note.json").read_text())
+    assert note["recording"]["sha256"] == digest and note["calibration"] == {"file": "unit.toml", "sha256": units}
 
 
 def test_the_note_of_the_shipped_recording_takes_4_kb(run):
@@ -250,11 +243,6 @@ def test_frames_are_read_as_python_reads_them(text, expected):
 def test_other_selections_are_refused(text):
     with pytest.raises(TactileError, match="--frames"):
         results.parse_frames(text)
-
-
-def test_a_selection_without_frames_is_refused():
-    with pytest.raises(TactileError, match=r"--frames: 200:300 takes none of the 150 frames; expected indices from 0"):
-        results.select(slice(200, 300), 150)
 
 
 def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_path, tools, monkeypatch):

@@ -229,9 +229,10 @@ def test_an_older_result_is_replaced_only_when_asked(render, heights, tmp_path):
     status, _, err = render(heights)
     assert status == 2 and "--overwrite" in err
     assert render(heights, "--overwrite")[0] == 0
-    (tmp_path / "mine").mkdir()
-    status, _, err = render(heights, "--overwrite", out="mine")
-    assert status == 2 and "no result" in err
+    (tmp_path / "converted").mkdir()  # a result's note tells which verb made it
+    (tmp_path / "converted" / "note.json").write_text('{"format": "tactile-result-1"}')
+    status, _, err = render(heights, "--overwrite", out="converted")
+    assert status == 2 and "no result of this verb" in err and (tmp_path / "converted" / "note.json").exists()
 
 
 def save(**arrays):
@@ -288,17 +289,6 @@ def test_bad_options_end_in_one_message(more, words, render, heights, tmp_path):
 def test_a_bound_on_a_scene_s_gel_is_simulate_s(render):
     status, _, err = render(SCENES / "press", "--error", "9um")
     assert status == 2 and "Simulate the scene first" in err
-
-
-def test_the_result_of_convert_that_is_rendered_is_not_replaced(render, tmp_path):
-    """A result's note tells which verb made it."""
-    (tmp_path / "out").mkdir()
-    with FramesFile(tmp_path / "out" / "frames.h5", 1, ("displacement",), {}) as file:
-        still = np.zeros((1, len(digit_surface().rest), 3), np.float32)
-        file.write(0, {"frame": np.array([0]), "displacement_digit": still})
-    (tmp_path / "out" / "note.json").write_text('{"format": "tactile-result-1"}')
-    status, _, err = render(tmp_path / "out" / "frames.h5", "--overwrite")
-    assert status == 2 and "no result of this verb" in err and (tmp_path / "out" / "frames.h5").exists()
 
 
 @pytest.mark.parametrize("size", ["24000x32000", "3000x4000"])
