@@ -1,6 +1,5 @@
 """Sensors beside the BioTac and the DIGIT: any gel to translate to, weights of other sensors, what a scene holds."""
 
-import os
 import shutil
 from pathlib import Path
 
@@ -32,14 +31,18 @@ def known(own_sensors, monkeypatch):
 
 
 @pytest.fixture
-def on_both(imported, needs):
+def on_both(imported, needs, opened):
     """The recording's press on a DIGIT, and on the other gel behind it."""
     needs("scipy")
-    imported(frames="55:85:6")
-    bpy.ops.tactile.translate()
-    bpy.ops.tactile.set_style(style="DISPLACEMENT")
-    bpy.ops.tactile.translate(to=GEL.upper())
-    return [next(t for t in bpy.context.scene.objects if t.tactile.role == "DIGIT" and t.tactile.sensor == sensor)
+
+    def make():
+        imported(frames="55:85:6")
+        bpy.ops.tactile.translate()
+        bpy.ops.tactile.set_style(style="DISPLACEMENT")
+        bpy.ops.tactile.translate(to=GEL.upper())
+
+    scene = opened("two gels", make)
+    return [next(t for t in scene.objects if t.tactile.role == "DIGIT" and t.tactile.sensor == sensor)
             for sensor in ("digit", GEL)]  # fmt: skip
 
 
@@ -173,13 +176,3 @@ def test_a_file_of_a_former_version_holds_the_usual_pair(imported, part):
     bpy.context.view_layer.objects.active = skin
     bpy.ops.tactile.translate()
     assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
-
-
-def test_the_preferences_name_a_folder_of_sensors(part, monkeypatch, tmp_path):
-    preferences = bpy.context.preferences.addons[part("addon.settings.preferences").ID].preferences
-    monkeypatch.setenv("TACTILE_SENSORS", "")
-    preferences.sensors = str(tmp_path)
-    try:
-        assert os.environ["TACTILE_SENSORS"] == str(tmp_path)
-    finally:
-        preferences.sensors = ""
