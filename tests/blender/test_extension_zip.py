@@ -108,7 +108,7 @@ def test_blender_s_own_check_passes(packed, program):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_installed_copy_does_the_whole_job(packed, tmp_path, slide_csv):
+def test_the_installed_copy_does_the_whole_job(packed, tmp_path, slide_csv, works_elsewhere):
     code = f"""
 import sys
 import bpy, addon_utils
@@ -124,13 +124,7 @@ finally:
     addon_utils.disable(name)
 print("works")
 """
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")}
-    if bpy.app.binary_path:
-        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr"]
-    else:
-        command = [sys.executable, "-c"]
-    done = subprocess.run([*command, code], env=environment, capture_output=True, text=True, timeout=120)
-    assert "works" in done.stdout, done.stdout + done.stderr
+    works_elsewhere(code, BLENDER_USER_RESOURCES=str(tmp_path / "user"))
 
 
 @pytest.mark.skipif(

@@ -46,7 +46,7 @@ def test_save_as_elsewhere_takes_caches_along_and_finds_the_recording(imported, 
         (tmp_path / name).mkdir()
     shutil.copyfile(RECORDING, tmp_path / "a" / "touch.h5")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a" / "touch.blend"))
-    skin = imported(filepath=str(tmp_path / "a" / "touch.h5"), motion="MESH_CACHE")
+    skin = imported(filepath=str(tmp_path / "a" / "touch.h5"), frames="70:90", motion="MESH_CACHE")
 
     def named():
         return skin.tactile.recording, skin.modifiers["Tactile"].filepath
@@ -69,7 +69,7 @@ def test_save_as_by_another_path_to_the_same_folder_keeps_the_cache(imported, sc
     (tmp_path / "a").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "a", target_is_directory=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a" / "touch.blend"))
-    skin = imported(motion="MESH_CACHE")
+    skin = imported(frames="70:72", motion="MESH_CACHE")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "link" / "again.blend"))
     assert Path(bpy.path.abspath(skin.modifiers["Tactile"].filepath)).is_file()
 
@@ -81,7 +81,7 @@ def test_save_as_leaves_the_recordings_of_another_blend_alone(imported, scene, p
         file.parent.mkdir(parents=True)
         file.write_bytes(content)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a" / "touch.blend"))
-    skin = imported(filepath=str(simulated))
+    skin = imported(filepath=str(simulated), frames="70:72")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "b" / "touch.blend"))
     assert another.read_bytes() == b"another's"
     assert skin.tactile.recording == "//tactile_simulations/Ball_2.h5"
@@ -126,7 +126,7 @@ def test_a_long_recording_has_a_mesh_cache_that_goes_with_the_file(
 
 def test_a_mesh_cache_of_a_new_file_of_blender_s_is_in_its_units(imported, nodes_of):
     bpy.ops.wm.read_homefile(use_factory_startup=True)  # with cube, light and camera
-    skin = imported(motion="MESH_CACHE")
+    skin = imported(frames="70:72", motion="MESH_CACHE")
     assert np.ptp(nodes_of(skin), axis=0).max() == pytest.approx(28, abs=3)  # mm
 
 
@@ -140,7 +140,7 @@ def test_the_scene_plays_in_the_recording_s_time(imported, scene):
 
 
 def test_the_scene_s_own_unit_is_kept_when_asked(imported, scene, nodes_of):
-    skin = imported(millimetres=False)
+    skin = imported(frames="70:72", millimetres=False)
     assert scene.unit_settings.scale_length == 1.0
     assert np.ptp(nodes_of(skin)[:, 0]) == pytest.approx(0.02796, abs=2e-4)  # m, the skin's length (docs/sources.md)
 
@@ -185,7 +185,7 @@ def test_a_property_can_drive_something(imported, loaded, scene):
 
 
 def test_the_core_lies_inside_the_skin(imported, nodes_of, scene):
-    skin = imported()
+    skin = imported(frames="70:72")
     core = scene.objects["BioTac core"]
     low, high = nodes_of(skin).min(axis=0), nodes_of(skin).max(axis=0)
     inside = nodes_of(core)
@@ -223,7 +223,7 @@ def test_one_frame_is_enough(imported, nodes_of, wanted):
 def test_undo_takes_it_back(imported, scene):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="before")
-    imported()
+    imported(frames="70:72")
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.ed.undo()
     assert not bpy.context.scene.objects
