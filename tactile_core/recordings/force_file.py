@@ -44,6 +44,8 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
     columns = table.columns(chosen)
     timed = not own and columns.shape[1] in (2, 4)
     for name in chosen[int(timed) :]:
+        if ("time" in name or "stamp" in name) and not own:
+            raise TactileError(where, f"the time in column {name!r}", COLUMNS, ADVICE)
         if OTHER_UNIT.search(name):
             raise TactileError(where, f"a column {name!r}", "newtons", "Convert it, and name the column after them")
     size = _size(where, columns[:, int(timed) :], table.lines)

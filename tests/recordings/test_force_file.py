@@ -71,6 +71,13 @@ def test_what_is_no_force_beside_the_recording_is_refused(columns, said, tmp_pat
         read_force(written(tmp_path, columns), recording())
 
 
+@pytest.mark.parametrize("header", ["force,time", "time,fx,fy"])
+def test_a_time_that_would_be_taken_for_a_force_is_refused(header, tmp_path):
+    columns = np.column_stack([SIZE] * (header.count(",") + 1))
+    with pytest.raises(TactileError, match="the time in column 'time'; expected N in one column or three"):
+        read_force(written(tmp_path, columns, header), recording())
+
+
 @pytest.mark.parametrize("unit", ["[lbf]", "(kg)", "_ozf", "_gf"])
 def test_a_column_named_after_another_unit_is_refused(unit, tmp_path):
     with pytest.raises(TactileError, match=r"a column 'force.*'; expected newtons"):
