@@ -48,7 +48,7 @@ class Quiet:
 @dataclass(frozen=True, eq=False)
 class _Windows:
     """Statistics of all W windows of n consecutive frames of a recording, by first frame.
-    sums : (19, W) of counts, in single precision if that is exact, which halves the memory; calm : (W,) bool
+    sums : (19, W) of counts; calm : (W,) bool
     pdc : (W,) mean counts, or None; middle : (W,) s, time of the window's middle"""
 
     n: int
@@ -59,9 +59,9 @@ class _Windows:
 
     def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Return the largest value (W,) over the electrodes of change(means), means (W,) counts in each window."""
-        found = change(self.sums[0].astype(float) / self.n)
+        found = change(self.sums[0] / self.n)
         for sums in self.sums[1:]:
-            np.maximum(found, change(sums.astype(float) / self.n), out=found)
+            np.maximum(found, change(sums / self.n), out=found)
         return found
 
 
@@ -135,7 +135,7 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
     count = len(electrodes) - n + 1
     medians = np.array([[np.median(column)] for column in electrodes.T])
     noise = _noise(electrodes, n)[:, None]
-    sums, calm = np.zeros((electrodes.shape[1], count), np.float32), np.ones(count, bool)
+    sums, calm = np.zeros((electrodes.shape[1], count)), np.ones(count, bool)
     for start in range(0, count, BLOCK):  # sums of all would take seven times the recording
         part = electrodes[start : start + BLOCK + n - 1].T.astype(float, order="C")
         exact = _sums(part, n)
@@ -145,9 +145,6 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
         still = (_spread(part - medians, n) <= CALM_STD * noise) & (np.abs(trend) <= CALM_TREND * noise)
         calm[windows] = still.all(axis=0)
         sums[:, windows] = exact
-        if (sums[:, windows] != exact).any():
-            sums = sums.astype(float)
-            sums[:, windows] = exact
     pressure = _sums(pdc, n) / n if pdc is not None else None
     return _Windows(n, sums, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
 
@@ -196,10 +193,10 @@ def _tracked(
     if np.abs(middle - middle[anchor]).max() <= TRACKED or max(np.ptp(row[candidates]) for row in sums) <= near * n:
         return accepted
     for way in (candidates[candidates >= anchor], candidates[candidates < anchor][::-1]):
-        now, last = sums[:, anchor].astype(float) / n, float(middle[anchor])
+        now, last = sums[:, anchor] / n, float(middle[anchor])
         for start in range(0, len(way), STRETCH):
             rows = way[start : start + STRETCH]
-            means, times = sums[:, rows].T.astype(float) / n, middle[rows].tolist()
+            means, times = sums[:, rows].T / n, middle[rows].tolist()
             all_near = np.abs(means - now).max() + rate * abs(times[-1] - last) <= near
             for k, mean, time in zip(rows, means, times, strict=True):
                 step = rate * abs(time - last)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .recording import BLOCK
-
 LIMIT = 30.0  # counts from the level around it; a glitch (docs/sources.md, BioTac read-out)
 SHORT = 5  # samples; the longest glitch that a median of 11 samples can see
 STUCK = 50  # samples; longest stay of a single electrode at a wrong level that is still repaired (assumed, 0.5 s)
@@ -69,11 +67,7 @@ def is_time_series(glitches: np.ndarray) -> bool:
 
 def _jumping(values: np.ndarray) -> np.ndarray:
     """Return the indices (k,) int of the columns of values (T, C) counts that anywhere step by more than `LIMIT`."""
-    most = np.zeros(values.shape[1])
-    for start in range(0, len(values) - 1, BLOCK):
-        steps = np.diff(values[start : start + BLOCK + 1].astype(float), axis=0)
-        np.maximum(most, np.abs(steps, out=steps).max(axis=0), out=most)
-    return np.flatnonzero(most > LIMIT)
+    return np.flatnonzero([np.abs(np.diff(column.astype(float))).max(initial=0) > LIMIT for column in values.T])
 
 
 def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
