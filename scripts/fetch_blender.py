@@ -18,17 +18,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = [
-    "blender",
-    "xvfb",
-    "xauth",
-    "xdotool",
-    "imagemagick",
-    "libgl1-mesa-dri",
-    "libegl1",
-    "libllvm19",
-    "python3-numpy",
-]
+PACKAGES = ["blender", "xvfb", "xauth", "xdotool", "imagemagick"]
+PACKAGES += ["libgl1-mesa-dri", "libegl1", "libllvm19", "python3-numpy"]
 # sid's Blender needs them for its extensions' command line.
 EXTRA = {"sid": ["python3-cattr", "python3-requests"]}
 STAGES = ("imported", "translated", "rendered", "authored")
@@ -116,23 +107,16 @@ def photograph(binary: Path) -> None:
     ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]
     answer = subprocess.run(ask, check=True, capture_output=True, text=True).stdout
     python = answer.split("PY ")[1].split()[0]
-    build = [
-        sys.executable,
-        str(ROOT / "scripts" / "build_extension.py"),
-        "--debian",
-        "--python",
-        python,
-        "--out",
-        str(out),
-    ]
+    script = str(ROOT / "scripts" / "build_extension.py")
+    build = [sys.executable, script, "--debian", "--python", python, "--out", str(out)]
     packed = subprocess.run(build, check=True, capture_output=True, text=True).stdout.rsplit(" (", 1)[0].strip()
     for stage in STAGES:
         known = {"STAGE": stage, "OUT": str(out / f"{stage}.png"), "ZIP": packed,
                  "BLENDER_USER_RESOURCES": str(out / f"user-{stage}"), "HOME": "/root"}  # fmt: skip
         variables = [f"{name}={value}" for name, value in known.items()]
         window = ["blender", "--factory-startup", "--window-geometry", "0", "0", "1280", "800", "--python"]
-        script = ROOT / "tests" / "blender" / "screenshot.py"
-        run = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", *window, str(script)]
+        shot = ROOT / "tests" / "blender" / "screenshot.py"
+        run = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", *window, str(shot)]
         subprocess.run([str(binary), "--inside", "env", *variables, *run], check=True, timeout=STAGE_SECONDS)
         print(out / f"{stage}.png")
 

@@ -75,7 +75,11 @@ def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndar
 
     rest : (n, 3), displacement : (T, n, 3), in the object's own units; frames : (T,) of the scene
     """
-    keys = _keys_of(thing)
+    if thing.data.shape_keys is None:
+        thing.shape_key_add(name="Rest", from_mix=False)
+    keys = thing.data.shape_keys
+    for block in reversed(keys.key_blocks[1:]):
+        thing.shape_key_remove(block)
     keys.use_relative = False
     nodes = rest.astype(np.float32)
     times = np.empty(len(frames))
@@ -85,12 +89,3 @@ def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndar
         block.data.foreach_set("co", (nodes + moved).ravel())
         times[k] = block.frame  # steps of 10 that drift by rounding: read back, not counted
     curves.write_curve(keys, "eval_time", frames, times)
-
-
-def _keys_of(thing: bpy.types.Object) -> bpy.types.Key:
-    if thing.data.shape_keys is None:
-        thing.shape_key_add(name="Rest", from_mix=False)
-    keys = thing.data.shape_keys
-    for block in reversed(keys.key_blocks[1:]):
-        thing.shape_key_remove(block)
-    return keys

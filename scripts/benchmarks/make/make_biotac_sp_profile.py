@@ -48,7 +48,7 @@ def table(name: str = "biotac_sp") -> str:
     tips = np.where(np.isfinite(below), below, 0 * radii[1])  # beyond the core's apex the axis stands for it
     radii.append(np.where(held, radii[1], tips))
     lines = [
-        f"{middle + at:.4f},{angle:.0f}," + ",".join(_cell(layer[i, j]) for layer in radii)
+        f"{middle + at:.4f},{angle:.0f}," + ",".join(f"{layer[i, j]:.4f}" for layer in radii)
         for i, at in enumerate(x) for j, angle in enumerate(np.degrees(theta))
     ]  # fmt: skip
     return "\n".join([HEADER, *lines, ""])
@@ -75,10 +75,6 @@ def _shifted(x: np.ndarray, theta: np.ndarray, axes: np.ndarray, centre: float) 
     root = np.sqrt(np.maximum(b**2 - a * c, 0) + 0 * c)
     found = (-b + root) / a
     return np.where(found > 0, found, np.nan)
-
-
-def _cell(value: float) -> str:
-    return f"{value:.4f}" if np.isfinite(value) else "nan"
 
 
 if __name__ == "__main__":

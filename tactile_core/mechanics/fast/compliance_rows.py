@@ -49,7 +49,8 @@ class ComplianceRows:
 
     def block(self, nodes: np.ndarray) -> np.ndarray:
         """Return the compliance (3 k, 3 k) float32 m/N among nodes (k,), sorted, some of ``near``."""
-        return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
+        at = axes_of(self._gather(nodes))
+        return self._entries.take(at, axis=0).take(at, axis=1)
 
     def sensing_motion(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
         """Return the motion (3 k, c) m/N of the sensing points of indices ``inner`` (c,) under 1 N on each axis of
@@ -58,21 +59,12 @@ class ComplianceRows:
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
         """Return the displacements (n, 3) m of ``near``; arguments: see `Rows.moved`."""
-        moved = self._under(nodes, force)
+        at, (_, _, image), inner_move = self._gather(nodes), self.compliance.answers, self.compliance.inner_move
+        straight, none, no_force = np.zeros(len(at), bool), np.empty(0, int), np.empty(0)
+        moved = _sum_motion(self._entries_to_read, at, straight, image, force, inner_move, none, no_force)
         if len(inner):
-            moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]
+            moved += inner_force.astype(np.float32) @ inner_move[inner[:, None], self._columns]
         return moved.reshape(-1, 3).astype(float)
-
-    def _under(self, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Return the near nodes' displacements (3 n,) float32, m, under force (k, 3) N at sorted nodes (k,)."""
-        at, (_, _, image) = self._gather(nodes), self.compliance.answers
-        none, no_force, inner_move = np.empty(0, int), np.empty(0), self.compliance.inner_move
-        straight = np.zeros(len(at), bool)
-        return _sum_motion(self._entries_to_read, at, straight, image, force, inner_move, none, no_force)
-
-    def _rows(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 n) of nodes (k,) with all near ones."""
-        return self._entries.take(axes_of(self._gather(nodes)), axis=0)
 
     def _gather(self, nodes: np.ndarray) -> np.ndarray:
         """Read the rows of nodes (k,) that are not known yet; return the positions (k,) of all of them in ``near``."""

@@ -128,15 +128,13 @@ class LoadPath:
 
     def _at_force(self, pose: Pose, force: float, guess: float) -> ContactState:
         """Find the contact at a force, N, along the motion from ``pose``, near the depth ``guess``, m."""
-
-        def move(depth: float, before: ContactState) -> ContactState:
-            """Solve the contact at a depth, m, along the pose's direction, going on from the one before."""
-            return self._move(pose.moved(depth), before)
-
         where, slid_to = f"solve, {self.sensor}, {self.tier} tier", None
         if not same_line(self.last.pose, pose):
             slid_to = surface_drop(sensor_surface(self.sensor), self.indenter, self.pose, pose)
-        return touch_at_force(move, self.last, pose.direction, force, self.limit, where, guess, slid_to)
+        return touch_at_force(
+            lambda depth, before: self._move(pose.moved(depth), before), self.last, pose.direction, force, self.limit,
+            where, guess, slid_to,
+        )  # fmt: skip
 
     def _solution(self, touch: ContactState) -> Solution:
         mesh = self.body.solid.mesh
