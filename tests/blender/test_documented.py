@@ -17,6 +17,7 @@ def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, needs, mo
     assert code.count("12") == 3 and code.count("(6,") == 1
     code = code.replace("12", "3").replace("(6,", "(2,")  # a quarter of the frames
     bpy.context.scene.frame_set(1)
+    bpy.context.scene.render.fps = 100  # a contact a frame
     exec(compile(code, str(PAGE), "exec"), {})  # noqa: S102 (the page's own text)
     found = part("tactile_core.simulation.scene").load_scene(tmp_path / "author" / "press")[0]
     forces = [point.force_n for point in found.recording.points]
