@@ -44,13 +44,6 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     return photograph * np.maximum(now, 0) / np.maximum(then, DARK)
 
 
-def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Return the mean and largest absolute difference, ``mean_levels`` and ``largest_levels``, of a picture at rest (H,
-    W, 3) from the modelled one. radiance : (H, W, LED) levels, of the coating at rest, which the model starts from"""
-    off = np.abs(picture - by_led(unit, radiance).sum(-1))
-    return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
-
-
 def _open_light(unit: Calibration) -> np.ndarray:
     return by_led(unit, open_radiance(unit)).sum(-1)
 

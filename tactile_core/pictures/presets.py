@@ -89,7 +89,9 @@ def cheapest(error: float, variant: str) -> str:
     """Return the name of the fastest preset by a ``variant`` of Mitsuba whose measured ``error``, grey levels rms from
     the full model, is at most this. Raises TactileError if none is."""
     table = measured()["presets"]
-    rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
+    times = {name: table[name]["ms"] for name in NAMES}  # by variant; numpy's is the same by all
+    ms = {name: known.get("numpy", known.get(variant, float("inf"))) for name, known in times.items()}
+    rows = [Candidate(name, table[name]["error"], ms[name]) for name in NAMES]
     return accuracy.cheapest(rows, error, "levels").name
 
 
@@ -97,8 +99,3 @@ def describe_choice(name: str, error: float) -> str:
     """Return a sentence on why the preset ``name`` was chosen. error : grey levels, the largest that was allowed"""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
-
-
-def _ms(ms: dict[str, float], variant: str) -> float:
-    """Return a preset's time, ms, from its measured ones: numpy's, else the ``variant``'s; infinity if not measured."""
-    return ms.get("numpy", ms.get(variant, float("inf")))

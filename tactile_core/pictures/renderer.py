@@ -13,7 +13,7 @@ from ..files.installed import needing
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import calibration_of
 from ..sensors.camera import COLOURS
-from .background import check_way, correction, raised_light, resting_picture
+from .background import by_led, check_way, raised_light, resting_picture
 from .camera_curve import bent, ends
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
@@ -201,7 +201,8 @@ class Renderer:
 
     def correction(self) -> dict[str, float]:
         """Return how far the picture at rest is from the modelled one, ``mean_levels`` and ``largest_levels``."""
-        return correction(self.calibration, self.rest_radiance, self.background)
+        off = np.abs(self.background - by_led(self.calibration, self.rest_radiance).sum(-1))
+        return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
         """Check a map ``given`` (H, W) m; return it as float32 with the unit's own dome. name : for errors"""

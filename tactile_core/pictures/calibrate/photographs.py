@@ -173,13 +173,6 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
     return red, green, blue
 
 
-def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Return the mask (H, W) bool of pixels within 9 px of one where picture (H, W, 3) and background (H, W, 3) differ
-    by over 18 levels in some channel."""
-    changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
-    return dilated(changed, DILATION)
-
-
 def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
     """Return ``mask`` (H, W), its true part grown by a disc of a ``radius``, px."""
     height, width = mask.shape
@@ -224,11 +217,12 @@ def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: flo
     # Dust and drift change single pixels here and there: only what is changed all around counts.
     if (~dilated(~changed, 2)).sum() < SMALLEST_PRESS * scale:
         return None
-    touched, region = dilated(changed, DILATION), region_of_interest(picture, background)
+    differs = np.abs(difference).max(-1) > CHANGE
+    touched, region = dilated(changed, DILATION), dilated(differs, DILATION)
     flags = []
     if (picture[touched].max(-1) == 255).mean() > OVER_EXPOSED:
         flags.append("over-exposed")
-    if (np.abs(difference).max(-1) > CHANGE).mean() > LARGEST_SHARE:
+    if differs.mean() > LARGEST_SHARE:
         flags.append("changed nearly all over: another lighting than the background's")
     beside = ~touched & (background.max(-1) > CHANGE)
     brighter = float(np.median(picture[beside].sum(-1) / background[beside].sum(-1))) - 1 if beside.any() else 0.0

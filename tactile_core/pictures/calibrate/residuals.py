@@ -80,14 +80,6 @@ GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels per unit of radiance, of C; levels p
 PRESS_STEP = 10e-3  # mm
 
 
-@dataclasses.dataclass(frozen=True)
-class _Lights:
-    """Light of a press on p pixels. changes : (3, p), by LED; terms : (9, p), changes times 1, right (mm), down (mm)"""
-
-    changes: np.ndarray
-    terms: np.ndarray
-
-
 class UnitResiduals:
     """Cost and normal equations over x = the unit's free numbers, then right, down, depth of each press in mm.
     start : calibration in reduced pixels, the priors' mean; sights : one for each photograph
@@ -139,8 +131,8 @@ class UnitResiduals:
             bench = self._pictures(self.unit(x))
         except TactileError:  # an LED over the picture or as high as the camera, gel that ends in the picture
             return np.inf
-        lights = [self._lights(bench, ball, sight) for ball, sight in zip(self.balls(x), self._sights, strict=True)]
-        self._bench, self._last, self._balls_now = bench, lights, self.balls(x)
+        terms = [self._terms(bench, ball, sight) for ball, sight in zip(self.balls(x), self._sights, strict=True)]
+        self._bench, self._last, self._balls_now = bench, terms, self.balls(x)
         for _ in range(GAIN_STEPS):
             matrix, gradient = self._gain_equations()
             self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
@@ -175,11 +167,10 @@ class UnitResiduals:
         inside = (balls[:, 2] >= 1e3 * SHALLOWEST).all() and (balls[:, 2] <= 1e3 * self._deepest).all()
         return bool(inside and (radii >= SMALLEST_RADIUS).all() and (radii <= LARGEST_RADIUS).all())
 
-    def _lights(self, bench: BallPictures, ball: np.ndarray, sight: Sight) -> _Lights:
+    def _terms(self, bench: BallPictures, ball: np.ndarray, sight: Sight) -> np.ndarray:
+        """Return each LED's light (9, p) of a press on its p pixels that count: its change times 1, right and down, mm.
+        ball : (3,) mm, right, down and depth"""
         changes = bench.lights((*(1e-3 * ball), sight.radius(self._radius)))[:, sight.counts]
-        return _Lights(changes, self._terms(bench, changes, sight))
-
-    def _terms(self, bench: BallPictures, changes: np.ndarray, sight: Sight) -> np.ndarray:
         right, down = (1e3 * values[sight.counts] for values in (bench.right, bench.down))
         return np.concatenate([changes, right * changes, down * changes])
 
@@ -187,14 +178,14 @@ class UnitResiduals:
         """Return each press's residuals (3, p), levels, of its p pixels that count, and the camera curve's slopes (3,
         p)."""
         pairs = zip(self._last, self._sights, strict=True)
-        found = (sight.missed((self.gain @ lights.terms).T) for lights, sight in pairs)
+        found = (sight.missed((self.gain @ terms).T) for terms, sight in pairs)
         return [(missed.T, slope.T) for missed, slope in found]
 
     def _gain_equations(self) -> tuple[np.ndarray, np.ndarray]:
         """Return Gauss-Newton's matrix (3, 9, 9) and gradient (3, 9) of each channel's gain."""
         matrix, gradient = np.diag(self._gain_weight), self._gain_weight * (self.gain - self._start_gain)
-        for lights, (missed, slope) in zip(self._last, self._missed(), strict=True):
-            bright = slope[:, None] * lights.terms
+        for terms, (missed, slope) in zip(self._last, self._missed(), strict=True):
+            bright = slope[:, None] * terms
             matrix = matrix + bright @ bright.swapaxes(1, 2)
             gradient = gradient + (bright @ missed[..., None])[..., 0]
         return matrix, gradient
@@ -211,34 +202,33 @@ class UnitResiduals:
         own, _ = self._gain_equations()
         mixed = np.zeros((3, count, 9))  # by channel
         unit_steps = self._steps_of_unit(numbers)
-        for k, (lights, (missed, slope)) in enumerate(zip(self._last, self._missed(), strict=True)):
+        for k, (terms, (missed, slope)) in enumerate(zip(self._last, self._missed(), strict=True)):
             columns = np.r_[:free, free + 3 * k : free + 3 * k + 3]
             slopes = np.concatenate([unit_steps[k], self._steps_of_press(x, k)], axis=1)  # (3, free + 3, p)
             slopes *= slope[:, None]
             matrix[np.ix_(columns, columns)] += np.einsum("cap,cbp->ab", slopes, slopes, optimize=True)
             gradient[columns] += np.einsum("cap,cp->a", slopes, missed, optimize=True)
-            mixed[:, columns] += slopes @ (slope[:, None] * lights.terms).swapaxes(1, 2)
-        for channel, terms in zip(mixed, own, strict=True):
-            matrix -= channel @ np.linalg.solve(terms, channel.T)
+            mixed[:, columns] += slopes @ (slope[:, None] * terms).swapaxes(1, 2)
+        for channel, equations in zip(mixed, own, strict=True):
+            matrix -= channel @ np.linalg.solve(equations, channel.T)
         return matrix, gradient
 
     def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Return for each press the derivatives (3, free, p) of its picture, channel first, by the free ones of the
         unit's numbers (22,), by forward differences."""
-        slopes = [np.zeros((3, int(self._free.sum()), lights.changes.shape[1])) for lights in self._last]
+        slopes = [np.zeros((3, int(self._free.sum()), terms.shape[1])) for terms in self._last]
         column = {number: k for k, number in enumerate(np.flatnonzero(self._free).tolist())}
         for group in TOGETHER:
             wanted = [number for number in group if number in column]
             bench, way = self._moved(numbers, group) if wanted else (self._bench, 1)
-            for k, (lights, sight) in enumerate(zip(self._last, self._sights, strict=True)):
-                after = self._lights(bench, self._balls_now[k], sight) if wanted else lights
+            for k, (before, sight) in enumerate(zip(self._last, self._sights, strict=True)):
+                after = self._terms(bench, self._balls_now[k], sight) if wanted else before
                 for number in wanted:
-                    terms = after.terms
+                    terms = after
                     if number >= FIRST_LED:  # of this LED alone
-                        changes, led = lights.changes.copy(), (number - FIRST_LED) // PER_LED
-                        changes[led] = after.changes[led]
-                        terms = self._terms(bench, changes, sight)
-                    slopes[k][:, column[number]] = self.gain @ (terms - lights.terms) / (way * STEP[number])
+                        terms, led = before.copy(), (number - FIRST_LED) // PER_LED
+                        terms[led::3] = after[led::3]
+                    slopes[k][:, column[number]] = self.gain @ (terms - before) / (way * STEP[number])
         return slopes
 
     def _moved(self, numbers: np.ndarray, group: tuple[int, ...]) -> tuple[BallPictures, int]:
@@ -253,6 +243,6 @@ class UnitResiduals:
 
     def _steps_of_press(self, x: np.ndarray, k: int) -> np.ndarray:
         """Return derivatives (3, 3, p), levels per mm, of press k's picture at x (n,): channel, right/down/depth, p."""
-        ball, lights, sight = self.balls(x)[k], self._last[k], self._sights[k]
-        after = [self._lights(self._bench, ball + step, sight).terms for step in PRESS_STEP * np.eye(3)]
-        return np.stack([self.gain @ (terms - lights.terms) / PRESS_STEP for terms in after], axis=1)
+        ball, before, sight = self.balls(x)[k], self._last[k], self._sights[k]
+        after = [self._terms(self._bench, ball + step, sight) for step in PRESS_STEP * np.eye(3)]
+        return np.stack([self.gain @ (terms - before) / PRESS_STEP for terms in after], axis=1)

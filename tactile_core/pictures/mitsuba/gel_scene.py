@@ -94,17 +94,14 @@ def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
             lights[f"{name}.to_world"] = type(lights[f"{name}.to_world"])(place)
             lights[f"{name}.emitter.radiance.value"] = mi.Color3f(lamp["emitter"]["radiance"]["value"])
     lights.update()
-    coating = unit.coating
-    numbers: dict[str, dict[str, Any]] = {
-               "diffuse": {"reflectance": coating.albedo},
-               "roughplastic": {"diffuse_reflectance": coating.albedo, "specular_reflectance": [coating.gloss] * 3,
-                                "alpha": coating.roughness, "eta": PIGMENT_INDEX / _outer_index(unit.gel_index)},
-               "principled": {"base_color": coating.albedo, "roughness": coating.roughness,
-                              "metallic": coating.metallic, "specular": coating.gloss}}  # fmt: skip
-    for name, value in numbers[coating.bsdf].items():
+    coating = material(unit.coating, unit.gel_index)
+    if "int_ior" in coating:  # loaded, the two indices are one number
+        coating["eta"] = coating["int_ior"] / coating["ext_ior"]
+    for name, value in coating.items():
+        number = value["value"] if isinstance(value, dict) else value
         for key in (f"gel.bsdf.{name}.value", f"gel.bsdf.{name}"):
             if key in gel:
-                gel[key] = type(gel[key])(np.asarray(value, float).tolist())
+                gel[key] = type(gel[key])(number)
     gel.update()
 
 

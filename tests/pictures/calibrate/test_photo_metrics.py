@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.pictures.calibrate.photo_metrics import lobe_overlap, metrics, psnr, similarity
-from tactile_core.pictures.calibrate.photographs import dilated, region_of_interest
+from tactile_core.pictures.calibrate.photographs import dilated, press_of
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +64,7 @@ def test_dilation_is_a_disc() -> None:
 def test_region_looks_at_the_largest_change_of_a_channel() -> None:
     background = np.full((60, 60, 3), 100, np.float32)
     picture = background.astype(np.uint8)
+    picture[:8, :8] = 160  # the press
     picture[30, 30, 2], picture[30, 50, 0] = 81, 118  # 19 and 18 levels
-    region = region_of_interest(picture, background)
+    region = press_of("one", picture, background).region
     assert region[30, 39] and region[21, 30] and not region[30, 40] and not region[30, 50]
