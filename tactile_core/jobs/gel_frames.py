@@ -24,6 +24,7 @@ from .frames_file import FORMAT as CONVERTED
 CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"
 EXPECTED = "frames.h5, a simulated recording (.h5), a height map (.npz, .exr), or a scene's folder"
 HEIGHT_ARRAY = "height_map"
+HEIGHTS = "height map"  # the kind of an input of them, in words
 
 Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 
@@ -62,7 +63,7 @@ def read_frames(
     if path.suffix == ".npz":
         return _of_npz(path)
     if path.suffix == ".exr":
-        return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
+        return Frames(HEIGHTS, np.zeros(1, int), heights=read_height(path)[None])
     return read_displacement(path, gel)
 
 
@@ -105,7 +106,7 @@ def _of_npz(path: Path) -> Frames:
         if len(shape) not in (2, 3) or 0 in shape:
             raise TactileError(f"{path}, {name}", f"shape {shape}", "heights (H, W) or (T, H, W), m")
         heights = store.array(name, (None,) * len(shape), np.float32).reshape(-1, *shape[-2:])
-    return Frames("height map", np.arange(len(heights)), heights=heights)
+    return Frames(HEIGHTS, np.arange(len(heights)), heights=heights)
 
 
 def _of_scene(path: Path, progress: Progress, gel: str) -> Frames:

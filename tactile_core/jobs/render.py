@@ -39,9 +39,6 @@ UNITS = (
     "response.R.blue B + ambient.R of camera.exr, bent by the camera's toe and shoulder; so G and B."
 )
 
-Progress = Callable[[int, int], None]
-
-
 MAKER = "tactile render"  # in the note
 
 

@@ -22,12 +22,12 @@ from .engine import job as jobs
 from .engine import run as runs
 from .engine.job import InputFacts, Job, Render
 from .engine.run import Place
-from .gel_frames import read_frames
+from .gel_frames import HEIGHTS, read_frames
 from .render import Options, Pictures, claimed, note_of, pictures
 from .results import frames_text, parse_frames, select
 from .translate_shards import check_unit
 
-NUMBERS, VALUES, KIND, HEIGHTS = "numbers", "values", "kind", "heights"  # arrays of a prepared file
+NUMBERS, VALUES, KIND = "numbers", "values", "kind"  # arrays of a prepared file
 
 
 def render_in_parts(
@@ -66,19 +66,16 @@ def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> J
 
 
 def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -> None:
-    words, heights = input_kind(folder, job)
-    frames = _frames(folder, job)
-    name, recipe = job.inputs[0].name, job.recipe
-    shape = None
-    if heights:
-        shape = _prepared(folder, job, VALUES, rows=slice(0, 1))[VALUES].shape[1:]
-    made = _pictures(job.calibration, recipe, shape)
+    kind, name, recipe = _kind(folder, job), job.inputs[0].name, job.recipe
+    first = _prepared(folder, job, VALUES, rows=slice(0, 1))[VALUES]
+    made = _pictures(job.calibration, recipe, kind, first.shape[1:])
     with atomic.new_folder(out, overwrite=options.overwrite) as partial:
         made.begin(partial)
         made.write_rest(partial)
         for number in range(count(folder, job)):
             checksummed.unpack(jobs.shard_file(folder, name, number), partial)
-        note = note_of(job.inputs[0].path, words, frames, made.renderer, recipe.preset, options)
+        frames = _frames(folder, job)
+        note = note_of(job.inputs[0].path, kind, frames, made.renderer, recipe.preset, options)
         atomic.write_json(partial / results.NOTE, note)
 
 
@@ -93,7 +90,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
         rows = select(parse_frames(job.recipe.frames), len(frames.numbers))
         arrays = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}
         kind = np.frombuffer(frames.kind.encode(), np.uint8)
-        checksummed.write(file, arrays | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
+        checksummed.write(file, arrays | {KIND: kind})
     return count(folder, job), made
 
 
@@ -105,8 +102,7 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
         return False
     start = number * recipe.shard_frames
     found = _prepared(folder, job, NUMBERS, VALUES, rows=slice(start, start + recipe.shard_frames))
-    shape = found[VALUES].shape[1:] if input_kind(folder, job)[1] else None
-    pictures = _pictures(job.calibration, recipe, shape)
+    pictures = _pictures(job.calibration, recipe, _kind(folder, job), found[VALUES].shape[1:])
     with tempfile.TemporaryDirectory() as name:
         pictures.begin(Path(name))
         for frame, values in zip(found[NUMBERS], found[VALUES], strict=True):
@@ -127,10 +123,8 @@ def count(folder: Path, job: Job[Render]) -> int:
     return -(-_frames(folder, job) // job.recipe.shard_frames)
 
 
-def input_kind(folder: Path, job: Job[Render]) -> tuple[str, bool]:
-    """Return the prepared input's kind in words, and true if it holds height maps."""
-    found = _prepared(folder, job, KIND, HEIGHTS)
-    return found[KIND].tobytes().decode(), bool(found[HEIGHTS])
+def _kind(folder: Path, job: Job[Render]) -> str:
+    return _prepared(folder, job, KIND)[KIND].tobytes().decode()
 
 
 def _frames(folder: Path, job: Job[Render]) -> int:
@@ -143,11 +137,11 @@ def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> di
 
 
 @functools.lru_cache(maxsize=2)
-def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] | None) -> Pictures:
-    """Return the writer of pictures, made once per process; heights : (H, W) of height maps, None for displacements"""
+def _pictures(calibration: str | None, recipe: Render, kind: str, shape: tuple[int, int]) -> Pictures:
+    """Return the writer of pictures, made once per process. kind : the input's; shape : of a frame's values"""
     check_unit(calibration, recipe.calibration)
     options = Options(
         calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise,
         object_reflectance=recipe.object_reflectance,
     )  # fmt: skip
-    return pictures(options, recipe.preset, heights)
+    return pictures(options, recipe.preset, shape if kind == HEIGHTS else None)

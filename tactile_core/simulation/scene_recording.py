@@ -113,7 +113,8 @@ def simulate_recording(
 
 def _read(frames: list[_Frame], time: np.ndarray, spec: RecordingSpec, seed: int) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the electrodes (T, e) and PDC (T,), counts, at the frames' ``time`` (T,) s, and a note on the pressure."""
-    pressure, change = _pressure(frames), np.stack([frame.change for frame in frames])
+    pressure = PRESSURE_AT_REST + np.array([frame.pressure for frame in frames])  # over the surrounding air
+    change = np.stack([frame.change for frame in frames])
     drift = spec.drift_counts / (spec.points[-1].time_s - spec.points[0].time_s)
     note = f" Fluid pressure {pressure.min() / 1e3:.2f} to {pressure.max() / 1e3:.2f} kPa; PDC counts "
     note += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the sheet law."
@@ -204,11 +205,6 @@ def _field(solved: Mapping[Sensor, Solution], keep: Collection[str], name: str) 
     if not solved:
         return {sensor: np.zeros(sensors.sensor_surface(sensor).rest.shape, np.float32) for sensor in kept}
     return {sensor: getattr(solved[sensor], name).astype(np.float32) for sensor in kept}
-
-
-def _pressure(frames: list[_Frame]) -> np.ndarray:
-    """Return the fluid's pressure (T,) Pa over the surrounding air."""
-    return PRESSURE_AT_REST + np.array([frame.pressure for frame in frames])
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:

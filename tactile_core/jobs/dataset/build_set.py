@@ -183,8 +183,9 @@ def _joined(
         mark = f"{file_name(unit)}_" if len(parts) > 1 else ""
         for one in done.recordings:
             path = paths[one.name]
-            file = known[chosen(path).file]
-            labels = {name: np.full(one.frames, text, object) for name, text in _labels(path, file).items()}
+            file, section = known[chosen(path).file], chosen(path).section
+            own = file.labels | ({} if section == "unit" else {"finger": section})
+            labels = {name: np.full(one.frames, text, object) for name, text in own.items()}
             try:
                 labels |= one.labels | _measured(recipe, path, file)
             except TactileError as error:
@@ -201,12 +202,6 @@ def _joined(
         content.update(json.dumps([one.name, one.split, told], sort_keys=True).encode())
     content.update(json.dumps(aside, sort_keys=True).encode())
     return Finished(out, content.hexdigest(), tuple(recordings), aside, warnings)
-
-
-def _labels(path: str, file: File) -> dict[str, str]:
-    """Return the labels of a recording, name -> text: those in its file's name, and the finger of a hand."""
-    section = chosen(path).section
-    return file.labels | ({} if section == "unit" else {"finger": section})
 
 
 def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:

@@ -42,7 +42,7 @@ class Growing:
         self.rows, self.bad = 0, 0  # that came; of them passed over
         if not self._path.is_file():
             raise TactileError(path, "there is no such file", "a CSV recording that is being written")
-        self._file = _identity(self._path.stat())
+        self._file = self._path.stat()
 
     def poll(self) -> Recording | None:
         """Return the rows since the last call; None if there are none, or if too many of them are bad.
@@ -78,7 +78,7 @@ class Growing:
         try:
             found = self._path.stat()
             size = found.st_size
-            if size < self._place or _identity(found) != self._file:
+            if size < self._place or not os.path.samestat(found, self._file):
                 change = "became shorter" if size < self._place else "was replaced by another file"
                 raise TactileError(self._path, change, "a file that grows", "Watch the new file")
             if size == self._place:
@@ -90,11 +90,6 @@ class Growing:
             raise TactileError(self._path, error.strerror or str(error), "a readable file") from error
         self._place += len(data)
         return data
-
-
-def _identity(found: os.stat_result) -> tuple[int, int]:
-    """Return what identifies a file while it grows."""
-    return found.st_dev, found.st_ino
 
 
 POLL = 0.002  # s between two looks at the file
