@@ -75,7 +75,11 @@ def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
     maker : verb that must have made it, as its note says; "" for `tactile convert`"""
     if not os.path.lexists(folder):
         return
-    if not is_result(folder, maker):
+    try:
+        note = json.loads(read_small(folder / NOTE))
+    except (OSError, ValueError, RecursionError, TactileError):
+        note = None
+    if not (isinstance(note, dict) and note.get("format") == FORMAT and note.get("made_by", "") == maker):
         raise TactileError(folder, "exists and is no result of this verb", "a free place", "Name another --out folder")
     names = sorted(path.name for path in folder.iterdir())
     others = [name for name in names if name not in OURS and not name.startswith(".")]  # as .DS_Store
@@ -90,15 +94,6 @@ def check_writable(out: Path) -> None:
     """Raise TactileError if a folder cannot be made or written; a missing one is not made."""
     with atomic.writing(out, advice="Name another --out, or allow writing"):
         atomic.probe(out)
-
-
-def is_result(folder: Path, maker: str = "") -> bool:
-    """Return true if a folder holds a result of a verb; maker : the verb, "" for `tactile convert`"""
-    try:
-        note = json.loads(read_small(folder / NOTE))
-    except (OSError, ValueError, RecursionError, TactileError):
-        return False
-    return isinstance(note, dict) and note.get("format") == FORMAT and note.get("made_by", "") == maker
 
 
 def parse_words(text: str, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:

@@ -65,10 +65,6 @@ class GelMesh:
         flat = self._plan[..., :2].reshape(-1, 2)
         return np.r_[flat.min(0), 0.0].astype(float), np.r_[flat.max(0), 0.0].astype(float)
 
-    def to_mesh(self, points: np.ndarray) -> np.ndarray:
-        """Return the points (n, 3) m, image frame (right, down, toward the camera), in mesh coordinates."""
-        return np.asarray(points) * [MM, -MM * self.up_scale, MM]
-
 
 def _kept(count: int, step: int) -> np.ndarray:
     """Return the indices of every ``step``-th of ``count`` pixels, and of the last one."""

@@ -56,13 +56,13 @@ class Tracer:
         """Trace the pixels' rays to the gel, and from there to points (n, 3) m, image frame, 1 <= n <= 32.
         shift : pixels to the right and down from each pixel's middle
         Returns places (H, W, 3) float32 m, and seen (H, W) uint32, bit k: point k lights the gel's front there."""
-        mi = activate(SCALAR)
+        mi, to_mesh = activate(SCALAR), np.array([MM, -MM * self.mesh.up_scale, MM])
         for axis, size, move in (("x", self.camera.width, shift[0]), ("y", self.camera.height, shift[1])):
             self.values[f"eye.principal_point_offset_{axis}"] = float(move / size)
         self.values.update()
         place = np.array(mi.render(self.scene, integrator=self._places, spp=1))[..., -3:]
         seen = np.zeros(self.camera.shape, np.uint32)
-        for k, light in enumerate(self.mesh.to_mesh(points)):
+        for k, light in enumerate(points * to_mesh):
             self.values["light.position"] = light
             self.values.update()
             lit = np.array(mi.render(self.scene, integrator=self._lit, spp=1))[..., 0]
