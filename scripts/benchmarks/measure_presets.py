@@ -8,6 +8,7 @@ Errors are grey levels rms over the picture, its channels and the fields, before
 converged direct light, in others from the full model of a matte coating: 64 pictures from 512 points per LED, four
 bounces gathered over horizons, the window. That model shares no code with our integrator and has next to no noise;
 Mitsuba's own path integrator, the preset `reference`, is compared with it too.
+The full model traces without LLVM: all takes some 40 minutes of CPU (estimated from one pass).
 Times are CPU time on one core, so that other programs do not count. Prints a table; exits 1 when an error row misses
 its target. Needs the extras [render] and [fem]; rows of llvm_ad_rgb only where LLVM works.
 """

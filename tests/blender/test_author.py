@@ -262,7 +262,13 @@ def test_pressing_by_height_finds_the_force_and_names_its_stages(gel_alone, part
         _key(ball, frame, z=height)
     job, seen = part("addon.process.jobs").Job, []
     poll = job.poll
-    monkeypatch.setattr(job, "poll", lambda self, wait=0.0: seen.append(self.stage) or poll(self, wait))
+
+    def polled(self, wait=0.0):
+        over = poll(self, wait)
+        seen.append(self.stage)
+        return over
+
+    monkeypatch.setattr(job, "poll", polled)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     assert seen[-1] == "Solving the contacts, 3 of 3"
     gel_alone.frame_set(1)

@@ -58,12 +58,18 @@ def test_an_untouched_finger_s_recording_is_its_rest_and_a_pressed_one_s_is_not(
             read_rest(str(tmp_path / f"{name}.npz"))
 
 
-@pytest.mark.parametrize("full", [3.3, 1023, 65535])
-def test_rest_of_readings_in_volts_or_of_other_bits_is_in_counts(full, tmp_path):
-    grips = [held(strength, seed, pdc=False) for seed, strength in enumerate([0.01, 0.02, 0.02, 0.5])]
+@pytest.mark.parametrize(("full", "pdc"), [(3.3, False), (1023, True), (65535, True)])
+def test_rest_of_readings_in_volts_or_of_other_bits_is_in_counts(full, pdc, tmp_path):
+    grips = [held(strength, seed, pdc=pdc) for seed, strength in enumerate([0.01, 0.02, 0.02, 0.5])]
     scale = full / 4095
-    found = find_rest([dataclasses.replace(one, electrodes=scale * one.electrodes) for one in grips])
-    np.testing.assert_allclose(found.counts, find_rest(grips).counts, atol=1e-6)
+    read = [
+        dataclasses.replace(one, electrodes=scale * one.electrodes, pdc=np.rint(scale * one.pdc) if pdc else None)
+        for one in grips
+    ]
+    found, wanted = find_rest(read), find_rest(grips)
+    # Pressures of 10 bits are a fourth as fine: another window of a grip may be its least pressed.
+    np.testing.assert_allclose(found.counts, wanted.counts, atol=1 if pdc else 1e-6)
+    assert found.pdc == (pytest.approx(wanted.pdc, abs=4) if pdc else None)
     still = np.rint(REST + np.random.default_rng(0).normal(0, 2, (300, 19)))
     np.savez(tmp_path / "still.npz", electrodes=scale * still)
     assert np.abs(read_rest(str(tmp_path / "still.npz")).counts - REST).max() < 1

@@ -80,6 +80,7 @@ def test_other_dtypes_are_not_written():
         (packed({"x": entry(), "y": entry()}, bytes(4)), "from byte 4"),
         (packed({"x": entry(), "y": entry(offsets=[8, 12])}, bytes(12)), "from byte 4"),
         (packed({"x": entry()}, bytes(5)), "5 bytes of data"),
+        (packed({"x": entry()}, bytes(4))[:-1], "a range inside"),
         (packed({"x": entry()}, b"\xff" * 4), "tensor x: values that are not finite"),
     ],
 )

@@ -63,8 +63,9 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs.dataset import build_set
 
     layouts = list(dict.fromkeys(word for word in options.layouts.split(",") if word))
-    if not layouts or not set(layouts) <= set(LAYOUTS):
-        raise TactileError("--to", repr(options.layouts), f"one or more of {', '.join(LAYOUTS)}", "Separate by commas")
+    unknown = [word for word in layouts if word not in LAYOUTS]
+    if unknown or not layouts:
+        raise TactileError("--to", repr(", ".join(unknown)), f"one or more of {', '.join(LAYOUTS)}")
     engine.check_counts(options, "workers")
     asked = build_set.Asked(
         layouts, engine.place_of(options), say, lambda name, unit: bar(name, unit, options.progress),

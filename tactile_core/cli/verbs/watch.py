@@ -78,10 +78,10 @@ def run(options: argparse.Namespace) -> int:
     from ...recordings.tables.column_map import refuse_bag
 
     _check(options)
-    path = options.rosbag_play or options.recording
+    path = options.recording if options.rosbag_play is None else options.rosbag_play
     container = container_of(path)
-    playing = options.play or options.rosbag_play
-    if options.rosbag_play and container != "bag":
+    playing = options.play or options.rosbag_play is not None
+    if options.rosbag_play is not None and container != "bag":
         raise TactileError(path, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
     if container != "csv" and not playing:
         raise TactileError(path, f"a finished recording ({container})", "a CSV file that grows", "Play it: add --play")

@@ -39,7 +39,6 @@ class GelMesh:
         self._plan = plan
         # Rows grow downward, so that (row x column) points to the camera: outward for Mitsuba.
         self.faces = grid_faces(len(along), len(across), closed=False).astype(np.uint32)
-        self.count = len(along) * len(across)
 
     def vertices(self, height: np.ndarray) -> np.ndarray:
         """Return the vertices (n, 3) float32, mesh coordinates, of a gel of ``height`` (H, W) m.

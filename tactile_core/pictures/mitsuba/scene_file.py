@@ -55,8 +55,8 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
     appear whole or not at all. Raises TactileError for another ending than .xml and heights that are not finite."""
     path, shape, eye = scene_files(path)
     mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
-    atomic.write_bytes(shape, _ply(mesh, height_map))
     square = square_pixels(unit.camera)
+    atomic.write_bytes(shape, _ply(mesh, height_map))
     view = dataclasses.replace(unit, camera=square)
     rows = np.rint((np.arange(square.height) + 0.5) * unit.camera.height / square.height - 0.5).astype(int)
     seen = Perspective(unit.camera, height_map)(height_map)[rows]

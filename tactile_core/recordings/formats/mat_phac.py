@@ -10,7 +10,7 @@ from typing import Any
 from ...errors import TactileError
 from ...sensors import ELECTRODES
 from ..array_store import Store
-from ..assemble import assemble, check_electrodes
+from ..assemble import MAX_FRAMES, assemble, check_electrodes
 from ..recording import Recording
 
 CONTAINER = "mat"
@@ -37,6 +37,9 @@ def read(store: Store, finger: int) -> Recording:
     if len({shape[-1:] for shape in lengths.values()}) > 1:
         found = "fingers of " + " and ".join(f"{shape[-1] if shape else 0}" for shape in lengths.values()) + " frames"
         raise TactileError(store.path, found, "as many of each finger", "Export it again")
+    if lengths[finger][-1] > MAX_FRAMES:  # before they are unpacked
+        advice = "Split the recording"
+        raise TactileError(store.path, f"{lengths[finger][-1]:,} frames", f"at most {MAX_FRAMES:,}", advice)
     electrodes = store.array(name, (ELECTRODES, None)).T
     frames = len(electrodes)
     store.taken.update(f"F{other}{each}" for other in lengths for each in ("Electrodes", "pac", "pdc", "tac", "tdc")

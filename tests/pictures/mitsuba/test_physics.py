@@ -31,7 +31,7 @@ def path_traced(unit, height, variant, *, depth: int, spp: int, renders: int, po
     """
     mi = activate(variant)
     mesh = GelMesh(unit.camera, spacing=0.0)
-    gel = mi.Mesh("gel", mesh.count, len(mesh.faces), has_vertex_normals=True)
+    gel = mi.Mesh("gel", len(mesh.vertices(height)), len(mesh.faces), has_vertex_normals=True)
     values = mi.traverse(gel)
     values["faces"], values["vertex_positions"] = mesh.faces.ravel(), mesh.vertices(height).ravel()
     values.update()
