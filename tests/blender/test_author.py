@@ -465,7 +465,7 @@ def test_a_result_waits_for_the_scene_that_it_is_of(scene, part):
     """As ``modal`` is called by a window's timer."""
     base, said, done = part("addon.operators.job_operator").JobOperator, [], []
     job = SimpleNamespace(poll=lambda: True, share=1.0, stage="Solving")
-    operator = SimpleNamespace(_job=job, _scene=scene.session_uid, finish=done.append, _close=lambda context: None)
+    operator = SimpleNamespace(_job=job, _scene=scene.session_uid, finish=done.append, cancel=lambda context: None)
     for seen, returned in ((bpy.data.scenes.new("other"), "RUNNING_MODAL"), (scene, "FINISHED")):
         context = SimpleNamespace(
             scene=seen,
