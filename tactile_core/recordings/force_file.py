@@ -14,11 +14,12 @@ from .tables.array_table import table_of
 from .tables.json_table import read_json
 from .tables.mapped import open_store
 from .tables.table import Table, read_table
-from .time_stamps import seconds_of
+from .time_stamps import SECONDS, WORDS, seconds_of
 
 MOST_FORCE = 100.0  # N: a fingertip breaks; numbers beyond are grams, millinewtons or counts (assumed)
 LEAST_CHANGE = 1e-3  # N, standard deviation below which a column is no force on a finger that touches (assumed)
 SHARED = 0.5  # of the recording's frames, that the force's clock must cover (assumed)
+OTHER_CLOCK = 300.0  # times the recording's length, that a force's clock in seconds hardly spans (assumed)
 COLUMNS = "N in one column or three (x, y, z), behind the column of time if there is one"
 OTHER_UNIT = re.compile(r"[\[(](lbf?|lbs|kgf?|gf?|grams?|ozf?|mn|kn|m?v|counts?)[\])]|_(lbf?|lbs|kgf?|gf|ozf)$")
 ADVICE = "Leave in it what is measured beside the recording, in newtons"
@@ -101,6 +102,11 @@ def _beside(where: str, stamps: np.ndarray, recording: Recording) -> np.ndarray:
         raise TactileError(f"{where}, column 1", "numbers that do not rise", "the time", ADVICE)
     if start and recording.start_time:
         time = time + (start - recording.start_time)
+    elif time[-1] > OTHER_CLOCK * (lasts := max(recording.duration, 1e-3)):
+        unit = min(WORDS, key=lambda unit: abs(np.log(time[-1] * SECONDS[unit] / lasts)))
+        found = f"{time[-1]:.4g} s if it is in seconds, beside a recording of {lasts:.4g} s"
+        advice = f"Is it in {WORDS[unit]}? Divide by {1 / SECONDS[unit]:g}"
+        raise TactileError(f"{where}, column 1", found, "the time in seconds", advice)
     covered = ((recording.time >= time[0]) & (recording.time <= time[-1])).mean()
     if covered < SHARED:
         found = f"{time[0]:.1f} to {time[-1]:.1f} s of the recording, {covered:.0%} of its frames"

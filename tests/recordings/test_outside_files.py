@@ -100,6 +100,7 @@ TEXTS = {
     "quoted.csv": lambda press: table(press, extra=("object", ['"a, b"'] * len(press.time))),
     "iso.csv": clock("%Y-%m-%d %H:%M:%S.%f"),
     "iso_t.csv": clock("%Y-%m-%dT%H:%M:%S.%fZ"),
+    "postgres.csv": clock("%Y-%m-%d %H:%M:%S.%f+00"),
     "iso_zone.csv": clock("%Y/%m/%d %H:%M:%S.%f+00:00"),
     "day_first.csv": clock("%d.%m.%Y %H:%M:%S.%f"),
     "two_columns.csv": lambda press: re.sub(r"(?m)^(\d+)\.(\d+)", r"\1,\g<2>000000", table(press)).replace(

@@ -112,6 +112,12 @@ def test_blank_lines_in_place_of_frames_are_told_and_those_at_the_end_are_not(sl
     assert not any("blank" in warning for warning in reported[1:])
 
 
+def test_a_header_of_another_order_within_the_rows_is_refused(slide_lines, write):
+    other = slide_lines[0].replace("ele2,ele3", "ele3,ele2")
+    with pytest.raises(TactileError, match="line 6: another header"):
+        recordings.read(write([*slide_lines[:5], other, *slide_lines[5:]]))
+
+
 def test_too_many_bad_rows_are_an_error(slide_lines, write):
     bad = [line if i % 4 or i == 0 else line.replace(",", ",x", 28) for i, line in enumerate(slide_lines)]
     with pytest.raises(TactileError, match=r"line 5, .*175 of 700 rows are bad; expected at most 20%"):

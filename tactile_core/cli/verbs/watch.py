@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from ...jobs.live.playback import Output
 
+LEAST_RATE, MOST_RATE = 1.0, 1e4  # Hz
 BRIEF = "show a recording live while it is being written"
 TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
@@ -60,7 +61,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="show a real DIGIT's camera, by number (0: /dev/video0) or from a video file, beside the simulated one",
     )
     verb.add_argument("--idle", type=float, metavar="S", help="end after S s without a new frame (default: never)")
-    verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="rate of the recording (default: 100)")
+    verb.add_argument("--rate", type=float, metavar="HZ", help="its rate (default: 100; with --play as its stamps say)")
     add(verb, "--polarity", "--columns")
     add(verb, "--tare", among=", of the first 10 s,")
     add(verb, *UNIT)
@@ -72,10 +73,12 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import convert, live
     from ...jobs.frame_pass import describe_gel
     from ...recordings import PrepareOptions
+    from ...recordings.chunks import read_parts
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first
     from ...recordings.recording import split
     from ...recordings.tables.column_map import refuse_bag
+    from ...sensors import SAMPLE_RATE
 
     _check(options)
     path = options.recording if options.rosbag_play is None else options.rosbag_play
@@ -85,8 +88,6 @@ def run(options: argparse.Namespace) -> int:
         raise TactileError(path, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
     if container != "csv" and not playing:
         raise TactileError(path, f"a finished recording ({container})", "a CSV file that grows", "Play it: add --play")
-    if not 1 <= options.rate <= 1e4:
-        raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
     columns = columns_of(options)
     if columns is not None:
         refuse_bag(path, container)
@@ -105,7 +106,10 @@ def run(options: argparse.Namespace) -> int:
         from ...recordings import electrode_gains  # reads by msgspec
 
         unit = electrode_gains.read(options.sensor).gains_for(path, split(path).section, options.sensor, sensor)
-    view = live.View(tools, options.rate, prepare, unit)
+    rate = options.rate or SAMPLE_RATE
+    if playing and options.rate is None:
+        rate = min(max(next(read_parts(path, columns, sensor)).recording.rate, LEAST_RATE), MOST_RATE)
+    view = live.View(tools, rate, prepare, unit)
     for sentence in describe_gel(tools.drawer.target, tools.drawer.found_on):
         say(sentence)
     with contextlib.ExitStack() as opened:
@@ -122,6 +126,8 @@ def _check(options: argparse.Namespace) -> None:
         raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
     if options.serve is not None and not 0 <= options.serve < 2**16:
         raise TactileError("--serve, port", f"{options.serve}", "0 to 65535")
+    if options.rate is not None and not LEAST_RATE <= options.rate <= MOST_RATE:
+        raise TactileError("--rate", f"{options.rate:g}", f"{LEAST_RATE:g} to {MOST_RATE:g} Hz")
     if options.speed is not None:
         if not (options.play or options.rosbag_play):
             raise TactileError("--speed", f"{options.speed:g}", "--play or --rosbag-play beside it")

@@ -18,7 +18,7 @@ MOST_WORDS = 10_000  # different texts kept of a column; the others of more beco
 MORE = "..."
 CLOCK = re.compile(
     r"(?:(?:(\d{4})[-/.](\d\d?)[-/.](\d\d?)|(\d\d?)\.(\d\d?)\.(\d{4}))[T ]+)?"
-    r"(\d\d?):(\d\d):(\d\d(?:[.,]\d*)?) ?(?:(Z|UTC)|([+-]\d\d):?(\d\d))?"
+    r"(\d\d?):(\d\d):(\d\d(?:[.,]\d*)?) ?(?:(Z|UTC)|([+-]\d\d)(?::?(\d\d))?)?"
 )
 DAY, EPOCH = 86400.0, date(1970, 1, 1).toordinal()
 MISSING = {"", "-", "--", "?", "nan", "none", "null", "na", "n/a", "#n/a", "<na>"}
@@ -57,7 +57,7 @@ def seconds(cell: str) -> float:
     *day_first, hour, minute, second, _, zone, minutes = found.groups()
     year, month, day = day_first[:3] if day_first[0] else day_first[:2:-1]
     days = date(int(year), int(month), int(day)).toordinal() - EPOCH if year else 0
-    zoned = float(f"{zone[0]}1") * (60 * int(zone[1:]) + int(minutes)) if zone else 0.0
+    zoned = float(f"{zone[0]}1") * (60 * int(zone[1:]) + int(minutes or 0)) if zone else 0.0
     return DAY * days + 3600 * int(hour) + 60 * (int(minute) - zoned) + float(second.replace(",", "."))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from ..labels import labels_of
-from .cells import LABEL, MISSING, Header, Words, unquoted
+from .cells import LABEL, MISSING, Header, Words, split, unquoted
 from .rows import clean, doubt_last_cell, is_row, no_number, row, tell_blank_lines
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
@@ -247,6 +247,11 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
         for frame, (line_number, line) in enumerate(kept):
             values[frame] = row(line, header, cells, frame, line_number, problems)
             _check_problems(path, problems, line_number)
+        for frame in {problem.frame for problem in problems}:
+            found = [cell.strip().lower() for cell in split(rows[frame], header.separator)]
+            if found != [*header.names] and len({*found} & {*header.names}) > len(header.names) / 2:
+                where = f"{path}, line {kept[frame][0]}"
+                raise TactileError(where, "another header", "columns as above", "Split the file there")
     if last and not ended and header.names[-1] not in cells.words:
         doubt_last_cell(kept, header.names, header.separator, values, problems)
     numbers = np.array([line_number for line_number, _ in kept])

@@ -105,6 +105,14 @@ def test_another_file_of_the_same_name_is_told(slide_csv, tmp_path):
         growing.poll()
 
 
+def test_what_is_played_comes_at_its_own_rate(slide_csv, tmp_path):
+    electrodes = recordings.read(slide_csv(frames=40)).electrodes
+    np.savez(tmp_path / "fast.npz", electrodes=electrodes, time=np.arange(40) / 200)
+    words = ["watch", str(tmp_path / "fast.npz"), "--play", "--speed", "0", "--out", str(tmp_path / "now.png")]
+    assert main([*words, "--tare", "1200:1500"]) == 0  # of the first 10 s, which are 2,000 frames
+    assert main([*words, "--tare", "1200:1500", "--rate", "100"]) == 2
+
+
 def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
     electrodes = recordings.read(slide_csv(frames=40)).electrodes
     np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
