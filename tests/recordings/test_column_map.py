@@ -73,6 +73,7 @@ def test_a_map_leads_through_convert_and_batch(own, tmp_path):
         ('"elec 03"', '"elec 99"', "column 'elec 99'"),
         ('"elec 03"', '"elec 04"', "18 different"),
         ('"elec 03", ', "", "18 names"),
+        ('pdc = "pdc raw"', 'pdc = "elec 03"', "named twice"),
         ('time_unit = "ms"', 'time_unit = "hours"', "time_unit"),
         ("pdc = ", "presure = ", "presure"),
         (column_map.FORMAT, "other", "format"),

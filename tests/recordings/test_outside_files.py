@@ -181,6 +181,13 @@ def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
     assert not (found.flags & Flag.TIME_JUMP).any()
 
 
+@pytest.mark.parametrize("shape", [(), (0, 19), (30, 0)])
+def test_arrays_without_rows_are_refused_by_a_map(shape, tmp_path):
+    np.savez(tmp_path / "empty.npz", held=np.zeros(shape))
+    with pytest.raises(TactileError, match=r"held: shape \(.*\); expected 1 to"):
+        recordings.read(tmp_path / "empty.npz", column_map.ColumnMap(electrodes=("held",)))
+
+
 def in_turns(press, by_value):
     """Rows of two fingers, one after the other."""
     head, *lines = (long(press) if by_value else table(press)).splitlines()

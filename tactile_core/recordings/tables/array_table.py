@@ -80,9 +80,9 @@ def _read(store: Store, name: str) -> np.ndarray:
     """Return the array `name`, rows first: (T, ...), or (T,) for one column. Raises TactileError if too long."""
     shape = store.shapes[name][0]
     frames = _rows(shape)[0]
-    if frames > MAX_FRAMES:
-        expected, advice = f"at most {MAX_FRAMES:,}", "Split the recording"
-        raise TactileError(f"{store.path}, {name}", f"{frames:,} rows", expected, advice)
+    if not (frames and prod(shape)) or frames > MAX_FRAMES:
+        expected, advice = f"1 to {MAX_FRAMES:,} rows", "Split a longer recording"
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", expected, advice)
     found = store.array(name, shape)
     found = found.T if _is_turned(shape) else found
     return found[:, 0] if found.ndim == 2 and found.shape[1] == 1 else found

@@ -88,6 +88,12 @@ def read(path: str | os.PathLike) -> ColumnMap:
         expected = f"{ELECTRODES}, of E1 to E{ELECTRODES}, or that of one array"
         advice = 'Write each column\'s name there once, and "" for an electrode that there is not'
         raise TactileError(f"{file}, electrodes", held, expected, advice)
+    used = columns.names()
+    for name in used:
+        if used.count(name) > 1:
+            raise TactileError(
+                f"{file}, {name:.80}", "a column that is named twice", "once", 'Write "" for one there is not'
+            )
     if bool(columns.channel) != bool(columns.value):
         expected = "both of a long table, or none"
         raise TactileError(f"{file}, channel", "channel and value: one is named", expected, "Name the other, too")
