@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import unicodedata
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -108,7 +109,7 @@ def _check_out(out: Path) -> None:
 
 def _counted(recipe: Recipe, found: Collected) -> list[str]:
     """Return sentences on the numbers of files to train and test with, and warnings that none is held out for testing,
-    or that labels differ in case alone."""
+    or that labels differ in case, or in how accents are written, alone."""
     splits = Counter(file.split for file in found.files)
     units = len(found.units())
     lines = [f"{len(found.files)} files of {units} units or hands: {splits[TRAIN]} train, {splits[TEST]} test"]
@@ -121,7 +122,7 @@ def _counted(recipe: Recipe, found: Collected) -> list[str]:
         lines.append("warning: nothing is left to train on: split.test names every recording")
     alike: dict[tuple[str, str], set[str]] = {}
     for name, text in (label for file in found.files for label in file.labels.items()):
-        alike.setdefault((name, text.casefold()), set()).add(text)
+        alike.setdefault((name, unicodedata.normalize("NFC", text).casefold()), set()).add(text)
     for (name, _), texts in alike.items():
         if len(texts) > 1:
             lines.append(f"warning: {name} {', '.join(sorted(texts))} are taken for different ones: rename the files")

@@ -50,9 +50,10 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
     patterns = [_compiled(pattern) for pattern in recipe.files]
     aside = [_compiled(name) for name in (recipe.unit.rest, recipe.force) if name]
     folder = Path(os.path.abspath(folder))  # as jobs name their inputs
-    if folder.resolve().is_relative_to(out.resolve()):
+    real, own = os.path.realpath, os.path.realpath(out)  # of links in a circle, too
+    if Path(real(folder)).is_relative_to(own):
         raise TactileError(folder, f"inside --out {out}", "a folder outside of it", "Name another --out")
-    names = [name for name in _names(folder) if not (folder / name).resolve().is_relative_to(out.resolve())]
+    names = [name for name in _names(folder) if not Path(real(folder / name)).is_relative_to(own)]
     found, others, unfit = [], 0, {}
     for name in names:
         if any(pattern.fullmatch(name) for pattern in aside):

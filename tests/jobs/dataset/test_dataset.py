@@ -189,13 +189,14 @@ def test_a_recording_that_is_there_twice_is_told(monkeypatch):
         assert told == expected
 
 
-def test_labels_that_differ_in_case_alone_are_named(recipe, tmp_path, capsys):
-    for name in ("Ball_1", "ball_2", "rolled_1"):
+def test_labels_that_differ_in_case_or_accents_alone_are_named(recipe, tmp_path, capsys):
+    for name in ("Ball_1", "ball_2", "rolled_1", "T\u00fcr_1", "Tu\u0308r_1"):
         (tmp_path / "in").mkdir(exist_ok=True)
         (tmp_path / "in" / f"{name}.npz").touch()
     assert main(command(recipe, tmp_path / "in", tmp_path / "out")) == 2
     said = capsys.readouterr().err
     assert "warning: object Ball, ball are taken for different ones: rename the files" in said
+    assert "warning: object Tu\u0308r, T\u00fcr are taken for different ones" in said
 
 
 @pytest.mark.parametrize(
@@ -291,7 +292,8 @@ def test_links_to_one_file_keep_labels_of_their_own(folder, recipe, tmp_path):
     (own[1] / "rolled_4.npz").unlink()
     (own[1] / "rolled_4.npz").symlink_to(own[1] / "ball_0.npz")
     (own[1] / "gone_1.npz").symlink_to(own[1] / "nowhere")
-    assert run(*own) == 2  # one file is not there
+    (own[1] / "loop_1.npz").symlink_to(own[1] / "loop_1.npz")
+    assert run(*own) == 2  # two files are not there
     held = {row["object"]: split for split in ("train", "test") for row in metadata(own[2] / "imagefolder" / split)}
     assert held == {"ball": "train", "rolled": "test"}
 
