@@ -173,22 +173,17 @@ def test_shards_of_strangers_are_read_with_care(change, said, job, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_warnings_of_the_recordings_go_with_them(job, tmp_path):
-    export.export(job, "npz", tmp_path / "out", silent)
-    listed = {one["name"]: one["warnings"] for one in json.loads((job / jobs.MANIFEST).read_text())["recordings"]}
-    assert listed["00001_b"]
-    assert json.loads((tmp_path / "out" / "note.json").read_text())["warnings"] == listed
-
-
 def test_what_a_job_did_not_keep_is_said_of_its_folder(job):
     with pytest.raises(TactileError, match=f"^{re.escape(str(job))}: holds no traction_digit"):
         finished_job.load(job).check_kept("traction_digit", "traction")
 
 
-def test_what_was_written_is_told(job, tmp_path, capsys):
+def test_what_was_written_is_told_and_warnings_of_the_recordings_go_with_it(job, tmp_path, capsys):
     assert main(["export", str(job), "--to", "npz", "--out", str(tmp_path / "out")]) == 0
     out, err = capsys.readouterr()
     assert out == f"{tmp_path / 'out'}\n" and "next: it holds one NPZ file a recording" in err
+    listed = {one["name"]: one["warnings"] for one in json.loads((job / jobs.MANIFEST).read_text())["recordings"]}
+    assert listed["00001_b"] and json.loads((tmp_path / "out" / "note.json").read_text())["warnings"] == listed
 
 
 def test_what_was_set_aside_is_told(job, tmp_path, capsys):

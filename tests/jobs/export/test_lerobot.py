@@ -86,7 +86,7 @@ def test_lerobot_reads_back_with_plain_pyarrow(job, tmp_path):
 
 
 @pytest.mark.parametrize("layout", ["lerobot", "lerobot21"])
-def test_no_number_is_missing_and_labels_are_features(layout, labelled, tmp_path):
+def test_no_number_is_missing_labels_are_features_and_pictures_have_statistics(layout, labelled, tmp_path):
     pytest.importorskip("cv2", reason="OpenCV is absent: pip install tactile-core[camera]")
     source = export.export(labelled, layout, tmp_path / "out", silent)
     info = json.loads((tmp_path / "out/meta/info.json").read_text())
@@ -107,17 +107,10 @@ def test_no_number_is_missing_and_labels_are_features(layout, labelled, tmp_path
         ]
         np.testing.assert_array_equal(state, np.concatenate(parts, axis=1))
         np.testing.assert_array_equal(action, [*state[1:], state[-1]])
-
-
-@pytest.mark.parametrize("layout", ["lerobot", "lerobot21"])
-def test_pictures_have_statistics_of_their_channels(layout, job, tmp_path):
-    pytest.importorskip("cv2", reason="OpenCV is absent: pip install tactile-core[camera]")
-    source = export.export(job, layout, tmp_path / "out", silent)
-    found = json.loads((tmp_path / "out/meta/stats.json").read_text())[PICTURE]
     pictures = np.concatenate([block["image"] for one in source.recordings for block in one.blocks()]) / 255
     for name in ("min", "max", "mean", "std"):
         expected = getattr(pictures, name)(axis=(0, 1, 2)).reshape(3, 1, 1)
-        np.testing.assert_allclose(found[name], expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(stats[PICTURE][name], expected, rtol=1e-9, atol=1e-9)
 
 
 def test_statistics_of_episodes_add_up_to_those_of_all():
