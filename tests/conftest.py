@@ -108,6 +108,7 @@ def coarse_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(press_fit, "DEPTHS", (0.4,))
     monkeypatch.setattr(press_fit, "TOLERANCE", 1e-3)
     monkeypatch.setattr(checked_fit, "COARSE_SIDE", 30)
+    monkeypatch.setattr(checked_fit, "LOOKED_AT", 1)
     monkeypatch.setattr(fit, "minimise", lambda *given, most, **more: minimise(*given, most=min(most, 4), **more))
 
 

@@ -200,11 +200,13 @@ def run(command: str, folder: Path, capsys: pytest.CaptureFixture) -> tuple[int,
 
 
 def in_bash(text: str, folder: Path) -> subprocess.CompletedProcess:
+    return process(folder, "bash", "-c", text)
+
+
+def process(folder: Path, *command: str | Path) -> subprocess.CompletedProcess:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        ["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS
-    )
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the pages' commands are written for a Unix shell")
@@ -254,10 +256,7 @@ def test_what_is_not_run_here_is_shown_and_run_there():
 def test_python_of_a_page_runs(text, user):
     if not TORCH and "tactile_core.training" in text:
         pytest.skip("torch is not installed: dev.py test --train")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", text], cwd=user, env=environment, capture_output=True, text=True, timeout=SECONDS
-    )
+    done = process(user, sys.executable, "-c", text)
     assert done.returncode == 0 and done.stdout, done.stderr
 
 
@@ -266,11 +265,8 @@ EXAMPLES = sorted((ROOT / "docs").glob("*_and_*.py"))
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
 def test_an_example_script_draws_its_figure(script, tmp_path):
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     copied = shutil.copy(script, tmp_path)  # as by a user of a wheel, who has no checkout beside it
-    done = subprocess.run(
-        [sys.executable, copied], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=SECONDS
-    )
+    done = process(tmp_path, sys.executable, copied)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / f"{script.stem}.png").stat().st_size > 20_000  # bytes; an empty figure takes 4,000
     assert re.search(r"\d", done.stdout), "it prints what it measured"
@@ -278,8 +274,7 @@ def test_an_example_script_draws_its_figure(script, tmp_path):
 
 @pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="sphinx is absent: dev.py docs")
 def test_the_site_builds_without_a_warning(tmp_path):
-    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "-q", "docs", str(tmp_path / "site")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS)
+    done = process(ROOT, sys.executable, "-m", "sphinx", "--fail-on-warning", "-q", "docs", tmp_path / "site")
     assert done.returncode == 0, done.stdout + done.stderr
     reference = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
     assert all(f'id="tactile_core.{name}' in reference for name in tactile_core.__all__)

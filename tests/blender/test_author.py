@@ -94,15 +94,16 @@ def test_a_scene_file_is_not_laid_over_sensors_that_are_there(imported):
         bpy.ops.tactile.import_scene(filepath=str(SCENES[0] / "scene.toml"))
 
 
-def test_a_motion_of_the_user_s_own_is_exported(sensors, part, tmp_path):
+def test_a_motion_friction_and_tilt_of_the_user_s_own_are_exported(sensors, part, tmp_path):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object
     sensors.render.fps, sensors.frame_start, sensors.frame_end = 50, 1, 51
-    ball.tactile.press_by = "FORCE"
+    ball.tactile.press_by, ball.tactile.friction, ball.tactile.tilt = "FORCE", 0.35, np.radians(12)
     _key(ball, 1, x=-8, y=0, force=0.0)
     _key(ball, 51, x=-10, y=2, force=0.4)
     _straighten(part, ball)
     recording = part("tactile_core.simulation.scene").load_scene(_export(tmp_path))[0].recording
+    assert (recording.friction, recording.tilt_deg) == (0.35, 12.0)
     assert [(p.time_s, p.x_mm, p.z_mm, p.force_n) for p in recording.points] == [
         (0.0, -8.0, 0.0, 0.0), (1.0, -10.0, 2.0, 0.4),
     ]  # fmt: skip
@@ -589,17 +590,6 @@ def test_an_indenter_snaps_to_the_gel_and_its_depth_is_read(sensors, part, shape
         assert bpy.ops.tactile.snap_to_gel(depth=wanted) == {"FINISHED"}
         # A micrometre: float32 locations of some tens of millimetres.
         assert 1e3 * depth(bpy.context, thing) == pytest.approx(wanted, abs=1e-3)
-
-
-def test_friction_and_tilt_reach_the_scene_file(sensors, part, tmp_path):
-    bpy.ops.tactile.add_indenter(shape="sphere")
-    thing = bpy.context.object
-    thing.tactile.press_by, thing.tactile.friction, thing.tactile.tilt = "FORCE", 0.35, np.radians(12)
-    _key(thing, 1, x=-8.0, y=0.0, force=0.0)
-    _key(thing, 20, x=-8.0, y=0.0, force=0.5)
-    sensors.frame_end = 20
-    spec = part("tactile_core.simulation.scene").load_scene(_export(tmp_path))[0].recording
-    assert (spec.friction, spec.tilt_deg) == (0.35, 12.0)
 
 
 def test_an_exported_scene_can_be_paired(sensors, part, tmp_path):

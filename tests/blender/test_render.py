@@ -167,6 +167,8 @@ def _channels(path):
         (lambda scene, gel: setattr(scene.camera.data, "sensor_fit", "HORIZONTAL"), "sensor fit HORIZONTAL"),
         (lambda scene, gel: setattr(gel, "hide_render", True), "DIGIT gel: hidden in view layer ViewLayer"),
         (lambda scene, gel: setattr(scene.collection.children[0], "hide_render", True), "hidden in view layer"),
+        (lambda scene, gel: setattr(scene.render, "resolution_x", 300), r"ratio of \d+ x \d+\. Set Up Render sets it"),
+        (lambda scene, gel: setattr(scene.tactile_render, "calibration", str(ROOT / "README.md")), "README.md"),
         (lambda scene, gel: _edit(gel), "DIGIT gel: in Edit Mode, where it is at rest; expected Object Mode"),
     ],
 )
@@ -311,21 +313,6 @@ def test_lights_change_their_own_colour(ready, rendered):
     change = np.abs(levels - rendered()).max(axis=(0, 1)) / 255
     # A unit's LEDs leak into the other colours: the shipped response has at most 0.26 of the red one, in a corner.
     assert change[0] > 0.1 and change[0] > 3 * max(change[1], change[2])
-
-
-def test_a_calibration_that_is_none_is_reported(ready, tmp_path):
-    bad = tmp_path / "unit.toml"
-    bad.write_text("format = 'something else'")
-    ready.tactile_render.calibration = str(bad)
-    ready.render.filepath = str(tmp_path / "frame.png")
-    with pytest.raises(RuntimeError, match=r"unit\.toml"):
-        bpy.ops.render.render(write_still=True)
-
-
-def test_another_aspect_ratio_is_reported(ready, tmp_path):
-    ready.render.resolution_x = 300
-    with pytest.raises(RuntimeError, match=r"aspect ratio of \d+ x \d+\. Set Up Render sets it"):
-        bpy.ops.render.render()
 
 
 def test_the_camera_looks_at_what_the_picture_shows(ready, part):

@@ -224,7 +224,7 @@ def test_signals_are_corrected_and_say_so(tmp_path):
 def test_a_sensor_file_comes_back(tmp_path):
     unit = ElectrodeGains('odd "name"\n.csv', [1.25, *ONES[1:]], [-3.5, *ZEROS[1:]])
     rested = msgspec.structs.replace(unit, rest_counts=[3300.0] * 19, rest_spread_counts=ONES, rest_pdc=1000.5)
-    rested = msgspec.structs.replace(rested, stiffness=1.25, stiffness_error=0.06)
+    rested = msgspec.structs.replace(rested, stiffness=1.25, stiffness_error=0.06, film=0.5)
     for sensor in (SensorFile(FORMAT, unit=unit), SensorFile(FORMAT, finger0=unit, finger3=rested)):
         electrode_gains.write(tmp_path / "sensor.toml", sensor)
         assert electrode_gains.read(tmp_path / "sensor.toml") == sensor
@@ -244,6 +244,7 @@ def test_a_sensor_file_comes_back(tmp_path):
         ({"rest_counts": [5000.0, *ONES[1:]]}, r"unit\.rest_counts, E1: 5000"),
         ({"rest_pdc": -1.0}, r"unit\.rest_pdc: -1"),
         ({"stiffness": 102.0}, r"unit\.stiffness: 102; expected 0.2 to 5"),
+        ({"film": 9.0}, r"unit\.film: 9; expected 0.2 to 3"),
         ({"stiffness_error": float("nan")}, r"unit\.stiffness_error: nan"),
     ],
 )

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tactile_core.cli.main import main
-from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, prepare
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.polarity import contact_signals
@@ -97,16 +96,6 @@ def test_what_a_drift_leaves_is_no_contact():
 def test_a_pressure_of_another_unit_shows_no_other_film(factor, shipped):
     other = dataclasses.replace(shipped, pdc=np.rint(factor * (shipped.pdc - shipped.pdc[0])))
     assert prepare(other).report["film"]["thickness"] == 1.0
-
-
-def test_a_unit_s_file_holds_its_film(tmp_path, press):
-    unit = electrode_gains.ElectrodeGains("", [1.0] * 19, [0.0] * 19, film=0.5)
-    electrode_gains.write(tmp_path / "unit.toml", electrode_gains.units_file({"unit": unit}))
-    assert electrode_gains.read(tmp_path / "unit.toml").sections()["unit"].film == 0.5
-    text = (tmp_path / "unit.toml").read_text()
-    (tmp_path / "unit.toml").write_text(text.replace("film = 0.5", "film = 9"))
-    with pytest.raises(TactileError, match=r"unit\.film: 9; expected 0.2 to 3"):
-        electrode_gains.read(tmp_path / "unit.toml")
 
 
 def test_later_parts_of_a_long_recording_have_the_film_of_the_first():
