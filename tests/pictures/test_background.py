@@ -31,11 +31,6 @@ def at_rest(unit, **led) -> np.ndarray:
     return Renderer(dataclasses.replace(unit, leds=leds), "fast").background
 
 
-def test_a_photograph_is_the_picture_at_rest_as_long_as_the_lights_are_its_own(unit):
-    with Image.open(unit.photograph) as image:
-        np.testing.assert_array_equal(at_rest(unit), np.asarray(image))
-
-
 def test_lights_that_are_off_or_doubled_act_on_a_photograph(unit):
     photograph = at_rest(unit)
     np.testing.assert_array_equal(at_rest(unit, radiance=lambda led: 0.0), 0)
