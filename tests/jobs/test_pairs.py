@@ -101,10 +101,8 @@ def interrupted(begun, tmp_path):
     return tmp_path / begun.name
 
 
-def test_two_workers_make_the_same_bytes_and_a_block_cut_short_again(made, scene, interrupted, monkeypatch):
-    monkeypatch.setattr(pairs, "GROWTH", 1)  # a block without contacts asks for one more, not for eight
-    block = next(parts_of(interrupted).glob("shards/*.h5"))
-    block.write_bytes(block.read_bytes()[:1000])
+def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, interrupted):
+    assert not interrupted.exists() and parts_of(interrupted).exists()
     make_pairs(scene, COUNT, 7, interrupted, place=lambda folder: Local(folder, 2))
     assert interrupted.read_bytes() == made.read_bytes()
     assert not parts_of(interrupted).exists()
@@ -222,6 +220,14 @@ def test_an_impossible_indenter_is_refused_before_anything_is_written_also_by_wo
         with pytest.raises(TactileError, match="radius"):
             make_pairs(bad, 5, 0, tmp_path / "x.h5", place=place)
     assert list(tmp_path.iterdir()) == [bad]
+
+
+def test_a_block_cut_short_is_made_again(scene, made, interrupted, monkeypatch):
+    monkeypatch.setattr(pairs, "GROWTH", 1)  # a block without contacts asks for one more, not for eight
+    block = next(parts_of(interrupted).glob("shards/*.h5"))
+    block.write_bytes(block.read_bytes()[:1000])
+    make_pairs(scene, COUNT, 7, interrupted)
+    assert interrupted.read_bytes() == made.read_bytes()
 
 
 def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, single):
