@@ -46,7 +46,7 @@ def copy(names: Sequence[str], out: str | Path) -> list[Path]:
     for target in wanted:
         atomic.claim(target, "To copy it to another place: tactile scenes copy --out OTHER")
     for target in wanted:
-        with atomic.new_folder(target) as partial:
+        with atomic.writing(target), atomic.new_folder(target) as partial:
             shutil.copytree(folder() / target.name, partial, dirs_exist_ok=True, ignore=_CACHES)
     return wanted
 

@@ -1,5 +1,6 @@
 """The example scenes are copied, whole, from a checkout and from a wheel, which has all of them."""
 
+import shutil
 import subprocess
 import tomllib
 from pathlib import Path
@@ -30,6 +31,16 @@ def test_nothing_is_written_over(tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["ring"]
     with pytest.raises(TactileError, match="no scene"):
         example_scenes.copy(["../press"], tmp_path)
+
+
+def test_a_full_disk_is_told(tmp_path, monkeypatch):
+    def full(*places, **options):
+        raise shutil.Error([("a", "b", "[Errno 28] No space left on device")])
+
+    monkeypatch.setattr(example_scenes.shutil, "copytree", full)
+    with pytest.raises(TactileError, match=r"press: cannot be written .*No space left on device"):
+        example_scenes.copy(["press"], tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture
