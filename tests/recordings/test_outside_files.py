@@ -188,6 +188,19 @@ def test_arrays_without_rows_are_refused_by_a_map(shape, tmp_path):
         recordings.read(tmp_path / "empty.npz", column_map.ColumnMap(electrodes=("held",)))
 
 
+@pytest.mark.parametrize("attribute", ["scale_factor", "add_offset"])
+def test_arrays_packed_as_netcdf_does_are_refused(attribute, press, tmp_path):
+    mapped = column_map.ColumnMap(electrodes=("electrodes",))
+    with h5py.File(tmp_path / "packed.h5", "w") as file:
+        file["electrodes"] = press.electrodes
+        file["electrodes"].attrs["scale_factor"], file["electrodes"].attrs["add_offset"] = 1.0, 0.0
+    assert len(recordings.read(tmp_path / "packed.h5", mapped)) == len(press.electrodes)
+    with h5py.File(tmp_path / "packed.h5", "a") as file:
+        file["electrodes"].attrs[attribute] = 0.5
+    with pytest.raises(TactileError, match=rf"electrodes: packed values \({attribute}\); expected plain"):
+        recordings.read(tmp_path / "packed.h5", mapped)
+
+
 def in_turns(press, by_value):
     """Rows of two fingers, one after the other."""
     head, *lines = (long(press) if by_value else table(press)).splitlines()
