@@ -25,7 +25,8 @@ from .labels import LONGEST
 # Bytes of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough).
 MAX_BYTES = 2 * 2**30
 MAX_HEADER = 10_000  # bytes of an array's header in NPZ, numpy's own limit
-SCALED = {"scale_factor": 1, "add_offset": 0}  # how netCDF packs numbers (CF conventions, Packed Data), and not at all
+# Attributes of packed numbers in netCDF (CF conventions, Packed Data), with the values that change nothing.
+SCALED = {"scale_factor": 1, "add_offset": 0}
 NPY = b"\x93NUMPY"
 _NPY_START = 12  # bytes: magic, version, length
 MATLAB, MATLAB_73 = b"MATLAB 5", b"MATLAB 7"  # how a file starts; the latter is HDF5
@@ -136,8 +137,8 @@ def open_hdf5(path: str) -> Iterator[Store]:
         def load(name: str, rows: slice | None = None) -> np.ndarray:
             """Return an array, or rows of it. Raises TactileError if it is packed or declares more than is stored."""
             declared(file[name], f"{path}, {name}")
-            for attribute, none in SCALED.items():
-                if np.any(file[name].attrs.get(attribute, none) != none):
+            for attribute, neutral in SCALED.items():
+                if np.any(file[name].attrs.get(attribute, neutral) != neutral):
                     advice = "Unpack it, as xarray's open_dataset does, and write it anew"
                     raise TactileError(f"{path}, {name}", f"packed values ({attribute})", "plain numbers", advice)
             return read_rows(file[name], rows)

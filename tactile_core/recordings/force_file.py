@@ -104,8 +104,8 @@ def _beside(where: str, stamps: np.ndarray, recording: Recording) -> np.ndarray:
         time = time + (start - recording.start_time)
     elif time[-1] > OTHER_CLOCK * (lasts := max(recording.duration, 1e-3)):
         unit = min(WORDS, key=lambda unit: abs(np.log(time[-1] * SECONDS[unit] / lasts)))
-        found = f"{time[-1]:.4g} s if it is in seconds, beside a recording of {lasts:.4g} s"
-        advice = f"Is it in {WORDS[unit]}? Divide by {1 / SECONDS[unit]:g}"
+        found = f"{time[-1]:,.0f} s if it is in seconds, beside a recording of {lasts:.4g} s"
+        advice = f"Is it in {WORDS[unit]}? Divide by {1 / SECONDS[unit]:,.0f}"
         raise TactileError(f"{where}, column 1", found, "the time in seconds", advice)
     covered = ((recording.time >= time[0]) & (recording.time <= time[-1])).mean()
     if covered < SHARED:

@@ -63,7 +63,7 @@ def test_an_array_of_the_recording_s_own_file_is_a_force(tmp_path):
         (np.zeros(FRAMES), "0 to 0, which cannot be a finger's force"),
         (np.where(np.arange(FRAMES) == 7, np.nan, SIZE), "no number in row 8"),
         (np.column_stack([START + 3600 + np.arange(FRAMES), SIZE]), "0% of its frames; expected at least 50%"),
-        (np.column_stack([np.arange(3000), np.tile(SIZE, 10)]), "2999 s if it is in seconds, .* Is it in milliseconds"),
+        (np.column_stack([np.arange(3000), np.tile(SIZE, 10)]), "2,999 s if it is in seconds, .* in milliseconds"),
         (np.column_stack([SIZE, SIZE]), "numbers that do not rise; expected the time"),
     ],
 )

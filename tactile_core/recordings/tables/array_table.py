@@ -77,7 +77,7 @@ def table_of(store: Store, wanted: Iterable[str]) -> Table:
 
 
 def _read(store: Store, name: str) -> np.ndarray:
-    """Return the array `name`, rows first: (T, ...), or (T,) for one column. Raises TactileError if too long."""
+    """Return the array `name`, rows first: (T, ...) or, for one column, (T,). Raises TactileError if empty or long."""
     shape = store.shapes[name][0]
     frames = _rows(shape)[0]
     if not (frames and prod(shape)) or frames > MAX_FRAMES:

@@ -247,7 +247,7 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
         for frame, (line_number, line) in enumerate(kept):
             values[frame] = row(line, header, cells, frame, line_number, problems)
             _check_problems(path, problems, line_number)
-        for frame in {problem.frame for problem in problems}:
+        for frame in sorted({problem.frame for problem in problems}):
             found = [cell.strip().lower() for cell in split(rows[frame], header.separator)]
             if found != [*header.names] and len({*found} & {*header.names}) > len(header.names) / 2:
                 where = f"{path}, line {kept[frame][0]}"
