@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import TactileError
-from . import lock
+from . import lock, outside
 
 # What json.dumps writes for a number, name or constant, and for a list of them, one per line. Strings hold no newline.
 _PLAIN = re.compile(r'"(?:[^"\\]|\\.)*"|[-+.\w]+')
@@ -210,6 +210,21 @@ def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
         raise TactileError(path, f"exists already ({_kind(path)})", "a new name", advice)
     with writing(path, "a place in a writable folder", "Choose another --out"):
         probe(path.parent)
+
+
+def claim_over(path: str | os.PathLike, start: bytes, kind: str, advice: str) -> None:
+    """Check before a long job that a file can be written to `path`, in place of nothing, of an empty file or of one
+    that begins with ``start``. kind : of such a file, as "PNG picture"; advice : what to do if something else is there
+    Raises TactileError for another file and a folder, and if the folder cannot be made or written."""
+    expected = f"a new file, or a {kind} to replace"
+    if os.path.isdir(path):
+        raise TactileError(path, "a folder", expected, advice)
+    with writing(path, "a file in a writable folder", advice):
+        if os.path.lexists(path):
+            with outside.open_file(path, expected) as file:
+                if file.read(len(start)) not in (start, b""):
+                    raise TactileError(path, f"a file that is no {kind}", expected, advice)
+        probe(os.path.dirname(path) or ".")
 
 
 def probe(folder: str | os.PathLike) -> None:

@@ -20,6 +20,7 @@ from ..files.provenance import Stopwatch
 from ..files.threads import in_one_thread
 from ..pictures.presets import FAST
 from ..recordings import PrepareOptions, Recording, labels
+from ..recordings.array_store import open_hdf5
 from ..sensors import SOURCE, TARGET
 from ..translation.answer import Answer
 from ..translation.translate import CHUNK, PreparedRows, load_translator
@@ -237,6 +238,15 @@ def note(
     }  # fmt: skip
 
 
+def _is_reversed(path: str | os.PathLike) -> bool:
+    """Return true if a file is a result of ``reverse``."""
+    try:
+        with open_hdf5(os.fspath(path)) as store:
+            return store.attributes.get("format") == REVERSE_FORMAT
+    except TactileError:
+        return False
+
+
 def reverse(
     path: str | os.PathLike,
     out: str | os.PathLike,
@@ -251,8 +261,11 @@ def reverse(
     translator : networks that lead to that gel; frames : slice of the input's; overwrite : true replaces `out`
     progress : called with (frames done, in all). Raises TactileError for an input without that gel's displacement, and
     an output that exists or cannot be written."""
-    if os.path.lexists(out) and not overwrite:
-        raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")
+    if os.path.lexists(out) and not (overwrite and _is_reversed(out)):
+        found = "exists, and is no result of --reverse" if overwrite else "exists"
+        raise TactileError(
+            out, found, "a new file", "Name another --out" if overwrite else "Add --overwrite, or another --out"
+        )
     held = read_displacement(path, translator.target)
     rows = select(frames, len(held.numbers))
     writable = atomic.writing(out, "a file in a writable folder", "Name another --out")

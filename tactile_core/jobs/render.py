@@ -23,7 +23,7 @@ from ..files.exr_file import write_exr
 from ..files.png_writer import write_png
 from ..files.provenance import Stopwatch
 from ..pictures.height_map import gel_mapper, of_unit
-from ..pictures.mitsuba.scene_file import camera_planes, scene_files, write_scene
+from ..pictures.mitsuba.scene_file import camera_planes, claim_scene, write_scene
 from ..pictures.mitsuba.variant import fitting
 from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, measured
 from ..pictures.renderer import Renderer
@@ -112,9 +112,8 @@ def claimed(out: Path, options: Options) -> str:
     killed runs left beside `out`. Raises TactileError for one that exists and may not be replaced, and for a preset
     beside levels."""
     results.check_free(out, options.overwrite, MAKER)
-    if options.scene_out is not None and not options.overwrite:
-        for file in scene_files(options.scene_out):
-            atomic.claim(file, "Name another --scene-out, or add --overwrite")
+    if options.scene_out is not None:
+        claim_scene(options.scene_out, overwrite=options.overwrite)
     results.check_writable(out.parent)
     atomic.sweep(out.parent)
     if options.levels is None:

@@ -330,5 +330,7 @@ def test_a_scene_file_takes_no_other_file_s_place(render, heights, tmp_path):
         (tmp_path / name).write_text("mine")
         status, _, err = render(heights, "--scene-out", tmp_path / "gel.xml")
         assert status == 2 and f"{name}: exists already (a file)" in err and "--overwrite" in err
+        status, _, err = render(heights, "--scene-out", tmp_path / "gel.xml", "--overwrite")
+        assert status == 2 and f"{name}: a file that is no scene's" in err
         assert not (tmp_path / "out").exists() and (tmp_path / name).read_text() == "mine"
         (tmp_path / name).unlink()

@@ -1,5 +1,7 @@
 """From a gel back to the skin: nearer the truth than an untouched finger, and refused where there is no gel."""
 
+import shutil
+
 import h5py
 import numpy as np
 import pytest
@@ -27,6 +29,13 @@ def test_a_gel_gives_back_the_skin_the_force_and_the_counts(shipped, tmp_path):
     before = out.read_bytes()
     assert main(words) == 2 and out.read_bytes() == before
     assert main([*words, "--overwrite"]) == 0 and out.read_bytes() == before
+    own, notes = tmp_path / "own.h5", tmp_path / "notes.txt"
+    shutil.copy(SHIPPED, own)
+    notes.write_text("mine")
+    for other in (own, notes):  # neither is an older result
+        held = other.read_bytes()
+        assert main(["convert", str(own), "--reverse", "--overwrite", "--out", str(other)]) == 2
+        assert other.read_bytes() == held
 
 
 def test_what_is_no_gel_is_refused(slide_csv, tmp_path, capsys):

@@ -37,7 +37,8 @@ LEAVES = RESUMES
 MOST_WARNINGS = 5  # that are printed
 RECIPE = (  # options that decide what is made, which goes on as it was begun
     "keep", "shard_frames", "weights", "sensor", "calibration", "preset", "kind", "counts_per_unit", "smooth",
-    "columns", "tare", "no_drift", "polarity", "frames_apart", "answer", "mount_shift", "samples", "gel", "target",
+    "columns", "tare", "no_drift", "polarity", "frames_apart", "answer", "mount_shift", "samples", "contacts", "gel",
+    "target",
 )  # fmt: skip
 
 

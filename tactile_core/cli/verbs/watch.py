@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
-import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -136,23 +135,10 @@ def _check(options: argparse.Namespace) -> None:
     if options.idle is not None and not 0 <= options.idle < math.inf:
         raise TactileError("--idle", f"{options.idle:g}", "seconds, 0 or more")
     if options.out is not None:
-        _check_out(options.out)
+        from ...files import atomic
+        from ...files.png_writer import SIGNATURE
 
-
-def _check_out(path: str) -> None:
-    """Raise TactileError for a path that cannot take a picture, before the first is drawn."""
-    from ...files import atomic, outside
-    from ...files.png_writer import SIGNATURE
-
-    expected, advice = "a new file, or a PNG picture to replace", "Name another --out"
-    if os.path.isdir(path):
-        raise TactileError(path, "a folder", expected, advice)
-    with atomic.writing(path, "a file in a writable folder", advice):
-        if os.path.lexists(path):
-            with outside.open_file(path, expected) as file:
-                if file.read(len(SIGNATURE)) not in (SIGNATURE, b""):
-                    raise TactileError(path, "a file that is no PNG picture", expected, advice)
-        atomic.probe(os.path.dirname(path) or ".")
+        atomic.claim_over(options.out, SIGNATURE, "PNG picture", "Name another --out")
 
 
 def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:

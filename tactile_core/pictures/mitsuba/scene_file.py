@@ -34,6 +34,7 @@ from .gel_scene import lamps, material, walls
 
 VERSION = "3.0.0"  # of the scene format
 PATHS, DEPTH = 256, 6
+STARTS = b"<?xml version='1.0' encoding='utf-8'?>\n<scene", b"ply\n", b"v/1\1"  # of the files
 # Mitsuba's XML has a tag for each kind of plugin.
 _TAGS = {
     "path": "integrator", "perspective": "sensor", "hdrfilm": "film", "box": "rfilter", "multijitter": "sampler",
@@ -42,7 +43,7 @@ _TAGS = {
 }  # fmt: skip
 
 
-def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
+def _files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
     """Return the paths of a scene's .xml, .ply and .camera.exr. Raises TactileError for another ending than .xml."""
     path = Path(path)
     if path.suffix != ".xml":
@@ -50,10 +51,19 @@ def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
     return path, path.with_suffix(".ply"), path.with_suffix(".camera.exr")
 
 
+def claim_scene(path: str | os.PathLike, *, overwrite: bool) -> None:
+    """Raise TactileError unless a scene's files can be written. overwrite : true replaces older files of their kind"""
+    for file, start in zip(_files(path), STARTS, strict=True):
+        if overwrite:
+            atomic.claim_over(file, start, f"scene's {file.suffix}", "Name another --scene-out")
+        else:
+            atomic.claim(file, "Name another --scene-out, or add --overwrite")
+
+
 def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarray) -> None:
-    """Write the scene of a height_map (H, W) m of the unit's own gel to the path and beside it (``scene_files``); files
+    """Write the scene of a height_map (H, W) m of the unit's own gel to the path and beside it; files
     appear whole or not at all. Raises TactileError for another ending than .xml and heights that are not finite."""
-    path, shape, eye = scene_files(path)
+    path, shape, eye = _files(path)
     mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
     square = square_pixels(unit.camera)
     atomic.write_bytes(shape, _ply(mesh, height_map))

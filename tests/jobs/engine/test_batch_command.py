@@ -32,7 +32,8 @@ def test_other_options_or_contents_in_the_same_folder_are_refused(command, recor
     for words in ([*recordings, "--keep", "height"], recordings[:1]):
         done = command(*words, "--out", out)
         assert done.returncode == 2 and "holds another job" in done.stderr
-    assert "given without INPUTS" in command("--out", out, "--keep", "height").stderr
+    for option in (["--keep", "height"], ["--contacts", "2"]):
+        assert "given without INPUTS" in command("--out", out, *option).stderr
 
 
 def test_the_same_job_elsewhere_has_the_same_id(new_job, tmp_path):
