@@ -12,12 +12,17 @@ combinations of fixed fields, those of the electrodes at rest and the principal 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
+import hashlib
 
 import numpy as np
 
 from ... import sensors
+from ...errors import TactileError
+from ...files import array_cache
+from ...files.threads import in_one_thread
 from ...geometry.lattice import Lattice, cap_faces
 from ...sensors import divider
 from ...sensors.fluid_sensor import FluidFilm
@@ -31,6 +36,8 @@ from ..solution import Solution
 from .thin_sheet import ThinSheet, resistances
 
 FED = 4  # electrodes of the excitation
+_FORMAT = 1  # raise when the meaning of the cached arrays changes
+_ROOM = "2 MB"
 _FINE = 2  # times the triangles are halved to find what the grid leaves unresolved near an electrode: 0.12 mm
 
 
@@ -41,7 +48,8 @@ class BiotacSheet:
     wet : (k,) number of each of the sheet's k nodes in the inner skin's lattice
     sensing : (k,) index of each of these nodes in ``sensing_points.sensing_nodes``
     film : (k,) m, thickness at rest; outward : (k, 3), unit, from the core to the skin
-    unresolved : (e + 4,) ohm, resistance near each electrode that the grid misses in a film of 1 m and 1 S/m"""
+    unresolved : (e + 4,) ohm, resistance near each electrode that the grid misses in a film of 1 m and 1 S/m
+    fields : (k - 1, r), potentials of all nodes but the first that the ``ReducedSheet`` combines"""
 
     fluid: FluidFilm
     sheet: ThinSheet
@@ -50,6 +58,7 @@ class BiotacSheet:
     film: np.ndarray
     outward: np.ndarray
     unresolved: np.ndarray
+    fields: np.ndarray
 
     def films(self, displacement: np.ndarray) -> np.ndarray:
         """Return the film's thickness (k,) m, ``fluid.thinnest`` or more; displacement : (n, 3) m of the inner skin"""
@@ -78,7 +87,7 @@ class BiotacSheet:
 
 @functools.cache
 def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
-    """Return the conducting sheet of a sensor's resting finger; solving it takes 10 ms.
+    """Return the conducting sheet of a sensor's resting finger, made in 3 s and cached; solving it takes 10 ms.
 
     Its film is made as thick over each electrode as the published gap: the public mesh's core stands 0.25 mm over the
     electrodes of the trunk and 0.6 mm under those of the tip."""
@@ -101,7 +110,26 @@ def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
     sensed = sensing_nodes(sensor)
     order = np.argsort(sensed)
     sensing = order[np.searchsorted(sensed, wet, sorter=order)]
-    return BiotacSheet(skin.descriptor.fluid, sheet, wet, sensing, film[wet], outward[wet], sheet.unresolved(_FINE))
+    kept = _cached(sensor, sheet, film[wet])
+    return BiotacSheet(skin.descriptor.fluid, sheet, wet, sensing, film[wet], outward[wet], **kept)
+
+
+def _cached(sensor: str, sheet: ThinSheet, film: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what takes seconds to compute: ``unresolved`` and ``fields`` of a ``BiotacSheet`` by their names. They
+    are read from the cache, or made and kept there. film : (k,) m, at rest"""
+    digest = hashlib.sha256(repr((_FORMAT, film_floor(sensor))).encode())
+    for array in (sheet.nodes, sheet.faces, sheet.patches, film):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    folder = array_cache.cache_folder() / f"sheet-{sensor}-{digest.hexdigest()[:16]}"
+    try:
+        return array_cache.load(folder, ("unresolved", "fields"))
+    except array_cache.DamagedError:
+        with in_one_thread:  # what one process keeps, every other computes with
+            made = {"unresolved": sheet.unresolved(_FINE), "fields": _fields(sheet, film, film_floor(sensor))}
+    with contextlib.suppress(TactileError):  # a cache that cannot be written costs time alone
+        array_cache.claim(folder, _ROOM)
+        array_cache.store(folder, made.items(), _ROOM)
+    return made
 
 
 def sensing_films(contact: Contact) -> np.ndarray:
@@ -157,9 +185,9 @@ class ReducedSheet:
     """A ``sheet`` that is solved quickly: the potentials of its n nodes, 0 V at the first, are sought among the
     combinations of r fixed ``fields`` (n - 1, r)."""
 
-    def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
-        self.sheet, self.fields = sheet, fields
-        self._patches = fields.T @ sheet.sheet.patches[1:]
+    def __init__(self, sheet: BiotacSheet) -> None:
+        self.sheet, self.fields = sheet, sheet.fields
+        self._patches = self.fields.T @ sheet.sheet.patches[1:]
         self.at_rest = self.resistances(sheet.film)
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
@@ -176,34 +204,40 @@ class ReducedSheet:
 
 @functools.cache
 def reduced_sheet(sensor: str = sensors.SOURCE) -> ReducedSheet:
-    """Make the reduced sheet of a sensor's finger; made in 1 s, once, it solves a contact in 3 ms."""
-    sheet = biotac_sheet(sensor)
-    rest = sheet.sheet.matrix(sheet.film)[1:, 1:].tocsc()
-    at_rest, dented = _potentials(sheet, sheet.film), [_potentials(sheet, films) for films in _dents(sheet)]
+    """Make the reduced sheet of a sensor's finger, which solves a contact in 3 ms."""
+    return ReducedSheet(biotac_sheet(sensor))
+
+
+def _fields(sheet: ThinSheet, film: np.ndarray, floor: float) -> np.ndarray:
+    """Return orthonormal fields (n - 1, r): of the electrodes at rest, then the principal ones of dented sheets.
+    film : (n,) m, at rest; floor : m, least thickness"""
+    rest = sheet.matrix(film)[1:, 1:].tocsc()
+    at_rest, dented = _potentials(sheet, film), [_potentials(sheet, films) for films in _dents(sheet, film, floor)]
     changes = np.concatenate(dented, 1)
     # What the fields at rest do not tell of them, in the energy of the sheet at rest.
     changes -= at_rest @ np.linalg.solve(at_rest.T @ (rest @ at_rest), at_rest.T @ (rest @ changes))
     energy, mixture = np.linalg.eigh(changes.T @ (rest @ changes))
     principal = changes @ (mixture[:, -_FIELDS:] / np.sqrt(energy[-_FIELDS:]))
-    return ReducedSheet(sheet, np.linalg.qr(np.concatenate([at_rest, principal], 1))[0])
+    return np.linalg.qr(np.concatenate([at_rest, principal], 1))[0]
 
 
-def _potentials(sheet: BiotacSheet, films: np.ndarray) -> np.ndarray:
+def _potentials(sheet: ThinSheet, films: np.ndarray) -> np.ndarray:
     """Return potentials (n - 1, e + 4) V of all nodes but the first (0 V) for 1 A into each electrode in turn, 1 S/m.
     films : (n,) m, thickness"""
-    return factor(sheet.sheet.matrix(films)[1:, 1:].tocsc())(sheet.sheet.patches[1:])
+    return factor(sheet.matrix(films)[1:, 1:].tocsc())(sheet.patches[1:])
 
 
-def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
-    """Draw the films (k,) m of 60 sheets with one bell-shaped dent each, the same at every call."""
-    random, nodes = np.random.default_rng(0), sheet.sheet.nodes
+def _dents(sheet: ThinSheet, film: np.ndarray, floor: float) -> list[np.ndarray]:
+    """Draw the films (n,) m of 60 sheets with one bell-shaped dent each, the same at every call.
+    film : (n,) m, at rest; floor : m, least thickness"""
+    random, nodes = np.random.default_rng(0), sheet.nodes
     pad = np.flatnonzero(nodes[:, 1] < _PAD)
     found = []
     for _ in range(_DENTS):
         away = np.linalg.norm(nodes - nodes[random.choice(pad)], axis=1)
         bell = np.exp(-((away / random.uniform(*_WIDTH)) ** 2))
-        found.append(sheet.film - random.uniform(*_DEPTH) * bell + random.uniform(*_BULGE) * (1 - bell))
-    return [np.maximum(films, sheet.fluid.thinnest) for films in found]
+        found.append(film - random.uniform(*_DEPTH) * bell + random.uniform(*_BULGE) * (1 - bell))
+    return [np.maximum(films, floor) for films in found]
 
 
 def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.ndarray:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
+from tactile_core.mechanics.electrodes import biotac_sheet as module
 from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor, reduced_sheet
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.sensing_points import electrode_feet, sensing_nodes
@@ -107,6 +108,31 @@ def test_it_is_near_in_dented_films():
     change, error = exact / rest - 1, (found - exact) / rest
     # measured on contacts: 0.28 % of rest where they change 9.3 %; these dents are unlike any
     assert np.sqrt(np.mean(error**2)) < 0.15 * np.sqrt(np.mean(change**2))
+
+
+def test_what_is_kept_is_what_was_made(tmp_path, monkeypatch):
+    """Read from the cache; made anew where a file of it is damaged, or nothing can be written."""
+    sheet = biotac_sheet()
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(module, "_DENTS", 4)
+    monkeypatch.setattr(module, "_FIELDS", 9)
+    made = module._cached("biotac", sheet.sheet, sheet.film)
+    assert made["fields"].shape == (len(sheet.film) - 1, 23 + 9)
+    (kept,) = tmp_path.glob("cache/sheet-biotac-*/fields.npy")
+    written = kept.read_bytes()
+    monkeypatch.setattr(module, "_fields", lambda *_: pytest.fail("made again"))
+    again = module._cached("biotac", sheet.sheet, sheet.film)
+    for name in ("unresolved", "fields"):
+        np.testing.assert_array_equal(again[name], made[name])
+    with pytest.raises(pytest.fail.Exception):  # another film has another entry
+        module._cached("biotac", sheet.sheet, 0.9 * sheet.film)
+    monkeypatch.setattr(module, "_fields", lambda *_: made["fields"])
+    kept.write_bytes(written[:-8] + bytes(8))
+    module._cached("biotac", sheet.sheet, sheet.film)
+    assert kept.read_bytes() == written
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path / "file"))
+    np.testing.assert_array_equal(module._cached("biotac", sheet.sheet, sheet.film)["fields"], made["fields"])
 
 
 def test_sensing_nodes_are_all_that_move_and_fill_the_sheet():
