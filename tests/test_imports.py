@@ -294,6 +294,41 @@ def test_no_function_bears_a_name_that_says_nothing():
     assert found == []
 
 
+def names_a_sensor(side: ast.AST, names: set[str]) -> bool:
+    """Whether a side of a comparison is one of these names of sensors, or `SOURCE`, `TARGET` or `PAIR`."""
+    constant = getattr(side, "id", getattr(side, "attr", ""))  # a name, or the last part of a dotted one
+    return (isinstance(side, ast.Constant) and side.value in names) or constant in ("SOURCE", "TARGET", "PAIR")
+
+
+def compared(path: Path) -> list[str]:
+    """Lines of a file that compare something with the name of a sensor that ships, or with a constant for one."""
+    names = {folder.parent.name for folder in (PACKAGE / "sensors").glob("*/sensor.toml")}
+    return [
+        f"{path.name}:{node.lineno}"
+        for node in nodes(path)
+        if isinstance(node, ast.Compare)
+        for each in (node.left, *node.comparators)
+        if any(names_a_sensor(side, names) for side in getattr(each, "elts", [each]))
+    ]
+
+
+def test_nothing_branches_on_a_sensor_s_name():
+    """Whoever needs to know asks the descriptor: ``sensors.is_gel``, ``sensors.describe``."""
+    assert [line for path in sources("tactile_core") for line in compared(path)] == []
+
+
+def test_a_branch_on_a_name_would_be_found(tmp_path):
+    lines = {
+        'sensor == "digit" or sensor not in ("biotac", "other")': 2,
+        "sensor != SOURCE or found != {sensors.TARGET}": 2,
+        "sensor != other": 0,
+    }
+    for number, (line, count) in enumerate(lines.items()):
+        path = tmp_path / f"{number}.py"
+        path.write_text(line)
+        assert len(compared(path)) == count, line
+
+
 def undocumented(node: ast.AST, where: str) -> list[str]:
     """Names of public classes, functions and methods below a node that have no docstring."""
     found = []

@@ -10,14 +10,6 @@ def test_nodes_are_reproduced_exactly() -> None:
     np.testing.assert_array_equal(spline.matrix(spline.nodes) @ values, values)
 
 
-def test_cubics_are_reproduced_with_their_slopes() -> None:
-    spline, at = EvenSpline(-1.0, 0.25, 9), np.linspace(-1, 1, 101)
-    cubic = np.polynomial.Polynomial([1, -2, 0.5, 3])
-    values = cubic(spline.nodes)
-    np.testing.assert_allclose(spline.matrix(at) @ values, cubic(at), atol=1e-13)  # rounding
-    np.testing.assert_allclose(spline.matrix(at, 1) @ values, cubic.deriv()(at), atol=1e-12)
-
-
 def test_agrees_with_scipy_not_a_knot() -> None:
     interpolate = pytest.importorskip("scipy.interpolate", reason="scipy is no requirement of the package")
     spline, at = EvenSpline(0.0, 0.5, 12), np.linspace(0, 5.5, 77)

@@ -21,16 +21,9 @@ def test_shipped_calibration_is_the_one_in_scenes() -> None:
     assert scenes.read_bytes() == SHIPPED.read_bytes()
 
 
-def test_written_file_reads_back_and_is_stable(tmp_path: Path) -> None:
-    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
-    calibration = dataclasses.replace(load_calibration(), unit='a "unit" of ours')
-    write_calibration(first, calibration)
-    again = load_calibration(first)
-    assert again.unit == calibration.unit
-    assert again.camera.apparent_height == pytest.approx(calibration.camera.apparent_height, rel=1e-5)
-    np.testing.assert_allclose(again.response.along_right, calibration.response.along_right, rtol=1e-5)
-    write_calibration(second, again)
-    assert second.read_bytes() == first.read_bytes()
+def test_a_unit_s_name_of_any_text_is_kept(tmp_path: Path) -> None:
+    write_calibration(tmp_path / "unit.toml", dataclasses.replace(load_calibration(), unit='a "unit" of ours'))
+    assert load_calibration(tmp_path / "unit.toml").unit == 'a "unit" of ours'
 
 
 def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> None:
@@ -88,6 +81,9 @@ def test_ambient_light_of_higher_gel_is_kept_and_may_be_left_out(tmp_path: Path)
         ("px_per_mm_x = ", "px_per_mm_x = 1000", "px_per_mm_x"),
         ("position_mm = [", "position_mm = [99999999999, ", r"leds, red, position_mm: .*a list of 3"),
         ("[camera]", "[camera", "table declaration"),
+        ('photograph = ""', 'photograph = "../rest.png"', "background, photograph"),
+        ('photograph = ""', 'photograph = "/etc/rest.png"', "background, photograph"),
+        ('photograph = ""', 'photograph = "sub/rest.png"', "background, photograph"),
     ],
 )
 def test_bad_file_is_refused(tmp_path: Path, old: str, new: str, where: str) -> None:
@@ -181,11 +177,3 @@ def test_start_of_unlike_units_reads() -> None:
     start = load_calibration(Path(__file__).parents[2] / "scenes" / "calibrations" / "start.toml")
     assert not start.fit.photographs
     assert start.camera.shape == (320, 240)
-
-
-@pytest.mark.parametrize("name", ["../rest.png", "/etc/rest.png", "sub/rest.png"])
-def test_photograph_lies_beside_the_file(tmp_path: Path, name: str) -> None:
-    file = tmp_path / "unit.toml"
-    file.write_text(SHIPPED_TEXT.replace('photograph = ""', f'photograph = "{name}"'), encoding="utf-8")
-    with pytest.raises(TactileError, match="background, photograph"):
-        load_calibration(file)

@@ -1,7 +1,6 @@
 """Scenes that ship load; anything else is refused with file and field."""
 
 import pathlib
-import re
 
 import msgspec
 import pytest
@@ -35,11 +34,14 @@ def write(folder, text):
         ("[pairs]", "[pairs", "end of a table"),
         ("[pairs]", "[pairs]\ndepth_steps = 5\ndepth_min_mm = 2.0", "depth_min_mm"),
         ("[pairs]", "[pairs]\ndepth_steps = 5\nslide_share = 0.3", "slide_share"),
+        ("time_s = 0.5,", "time_s = 9.5,", "growing times"),
+        ("force_n = 1.0", "force_n = 1e300", r"the number 1e\+300"),
     ],
 )
 def test_bad_scene_is_refused(tmp_path, old, new, said):
-    assert old in GOOD
-    path = write(tmp_path, GOOD.replace(old, new))
+    good = GOOD if old in GOOD else (SCENES / "press_roll_slide" / "scene.toml").read_text(encoding="utf-8")
+    assert old in good
+    path = write(tmp_path, good.replace(old, new))
     with pytest.raises(TactileError, match=said) as caught:
         load_scene(path)
     assert str(path) in str(caught.value)
@@ -47,21 +49,6 @@ def test_bad_scene_is_refused(tmp_path, old, new, said):
 
 def test_missing_scene(tmp_path):
     with pytest.raises(TactileError, match="cannot be read"):
-        load_scene(tmp_path)
-
-
-def test_recording_times_must_grow(tmp_path):
-    text = (SCENES / "press_roll_slide" / "scene.toml").read_text(encoding="utf-8")
-    with pytest.raises(TactileError, match="growing times"):
-        load_scene(write(tmp_path, text.replace("time_s = 0.5,", "time_s = 9.5,")))
-
-
-def test_numbers_beyond_all_measure_are_refused(tmp_path):
-    text = (SCENES / "press" / "scene.toml").read_text(encoding="utf-8")
-    changed = re.sub(r"force_n = [0-9.]+", "force_n = 1e300", text, count=1)
-    assert changed != text
-    (tmp_path / "scene.toml").write_text(changed)
-    with pytest.raises(TactileError, match="the number 1e\\+300"):
         load_scene(tmp_path)
 
 

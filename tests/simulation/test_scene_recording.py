@@ -14,7 +14,7 @@ from tactile_core.recordings import info
 from tactile_core.recordings.simulated import read_truth
 from tactile_core.sensors import PRESSURE_PER_COUNT
 from tactile_core.simulation import scene_recording as recording_room
-from tactile_core.simulation.scene_recording import PRESSURE_AT_REST, pdc_counts, sensors_of, simulate_recording
+from tactile_core.simulation.scene_recording import PRESSURE_AT_REST, pdc_counts, simulate_recording
 
 SHORT = ball_scene((0.0, -8.0, 0.0, 0.0), (0.4, -8.0, 0.0, 0.0), (0.5, -8.0, 2.0, 0.3), (0.6, -8.0, 2.0, 0.0))
 
@@ -186,8 +186,3 @@ def test_each_sensor_is_solved_by_its_tier(scene, tmp_path, monkeypatch):
         scene, tmp_path / "full.h5", keep=("displacement_biotac", "displacement_digit"), tiers={"digit": "full"}
     )
     assert asked == {("biotac", "fast"), ("digit", "full")}
-
-
-def test_outputs_name_the_sensors_they_need():
-    assert sensors_of(("electrodes", "displacement_biotac")) == ("biotac",)
-    assert sensors_of(("displacement_digit",)) == ("digit",)
