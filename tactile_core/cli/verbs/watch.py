@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from ...jobs.live.playback import Output
 
-LEAST_RATE, MOST_RATE = 1.0, 1e4  # Hz
 BRIEF = "show a recording live while it is being written"
 TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
@@ -60,7 +59,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="show a real DIGIT's camera, by number (0: /dev/video0) or from a video file, beside the simulated one",
     )
     verb.add_argument("--idle", type=float, metavar="S", help="end after S s without a new frame (default: never)")
-    verb.add_argument("--rate", type=float, metavar="HZ", help="its rate (default: 100; with --play as its stamps say)")
+    verb.add_argument("--rate", type=float, metavar="HZ", help="its rate (default: as its stamps say, 100 without)")
     add(verb, "--polarity", "--columns")
     add(verb, "--tare", among=", of the first 10 s,")
     add(verb, *UNIT)
@@ -72,12 +71,10 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import convert, live
     from ...jobs.frame_pass import describe_gel
     from ...recordings import PrepareOptions
-    from ...recordings.chunks import read_parts
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first
     from ...recordings.recording import split
     from ...recordings.tables.column_map import refuse_bag
-    from ...sensors import SAMPLE_RATE
 
     _check(options)
     path = options.recording if options.rosbag_play is None else options.rosbag_play
@@ -105,10 +102,7 @@ def run(options: argparse.Namespace) -> int:
         from ...recordings import electrode_gains  # reads by msgspec
 
         unit = electrode_gains.read(options.sensor).gains_for(path, split(path).section, options.sensor, sensor)
-    rate = options.rate or SAMPLE_RATE
-    if playing and options.rate is None:
-        rate = min(max(next(read_parts(path, columns, sensor)).recording.rate, LEAST_RATE), MOST_RATE)
-    view = live.View(tools, rate, prepare, unit)
+    view = live.View(tools, options.rate, prepare, unit)
     for sentence in describe_gel(tools.drawer.target, tools.drawer.found_on):
         say(sentence)
     with contextlib.ExitStack() as opened:
@@ -125,6 +119,8 @@ def _check(options: argparse.Namespace) -> None:
         raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
     if options.serve is not None and not 0 <= options.serve < 2**16:
         raise TactileError("--serve, port", f"{options.serve}", "0 to 65535")
+    from ...jobs.live.live_view import LEAST_RATE, MOST_RATE
+
     if options.rate is not None and not LEAST_RATE <= options.rate <= MOST_RATE:
         raise TactileError("--rate", f"{options.rate:g}", f"{LEAST_RATE:g} to {MOST_RATE:g} Hz")
     if options.speed is not None:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ...recordings.electrode_gains import ElectrodeGains
 
 LONGEST = 10.0  # s that are looked through for rest and polarity; then the calmest so far is taken (assumed)
+LEAST_RATE, MOST_RATE = 1.0, 1e4  # Hz
 AGAIN = 25  # new frames after which they are looked at again
 REMEMBERED = 1000  # latencies whose quantiles are reported
 
@@ -42,7 +43,8 @@ class LiveSignals:
 
     Rest and film are those of the first quiet part; drift and glitches are not removed. The first contacts decide the
     polarity; until then it is the given one, or "falls".
-    rate : Hz; options : of the preparation, without effect of drift, repair and smooth; tare is of the first 10 s
+    rate : Hz, None for that of the first rows' stamps
+    options : of the preparation, without effect of drift, repair and smooth; tare is of the first 10 s
     unit : gains, offsets and rest, which is taken if the first window is not calm near it; sensor : the sensor's name
     found : where the rest is from, in words, "" until it is known; polarity : "falls" or "rises"; evidence : what
         shows that, in words; sure : true once it is final
@@ -51,23 +53,20 @@ class LiveSignals:
 
     def __init__(
         self,
-        rate: float = SAMPLE_RATE,
+        rate: float | None = SAMPLE_RATE,
         options: PrepareOptions | None = None,
         unit: ElectrodeGains | None = None,
         sensor: str = SOURCE,
     ) -> None:
         options = options or PrepareOptions()
-        self._rate, self._unit, self._sensor = rate, unit, sensor
-        self._most = round(LONGEST * rate)
-        self._least = window_frames(rate)  # frames before the first look
-        if options.tare not in (None, "none"):
-            tare = tare_frames(options.tare, self._most)
-            options, self._least = dataclasses.replace(options, tare=tare), tare.stop
+        self._unit, self._sensor = unit, sensor
         self._options = dataclasses.replace(options, drift=False, repair=False, smooth=1)
         if unit is not None:
             self._options = dataclasses.replace(self._options, rest=unit.rest(), film=unit.film)
+        self.rate = rate or 0.0  # Hz; 0 until the first rows tell it
+        if rate:
+            self._begin(rate)
         self._seen: Recording | None = None
-        self._next_look = self._least
         self._known: Signals | None = None  # the first frames', once they show rest
         self._rest_pdc, self._pdc_factor = np.nan, 1.0  # counts at rest; counts that 1 in the file's PDC means
         self._factor = 1.0  # counts that an electrode's 1 in the file means
@@ -76,8 +75,17 @@ class LiveSignals:
         self._noisy, self._last = False, np.zeros((0, 0))  # whether noise keeps rows apart; the last rows
         self.found, self.evidence = "", "as given" if self.sure else "no contact has shown it yet"
 
+    def _begin(self, rate: float) -> None:
+        """Find, for a rate in Hz, the frames of the first look for rest and of the last."""
+        self.rate, self._most, self._next_look = rate, round(LONGEST * rate), window_frames(rate)
+        if self._options.tare not in (None, "none"):
+            tare = tare_frames(self._options.tare, self._most)
+            self._options, self._next_look = dataclasses.replace(self._options, tare=tare), tare.stop
+
     def learn(self, rows: Recording) -> bool:
         """Search new frames, rows, for rest and polarity; return true once rest is known."""
+        if not self.rate:
+            self._begin(min(max(rows.rate, LEAST_RATE), MOST_RATE))
         self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
         self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
         if self._known is None or not self.sure:
@@ -95,7 +103,7 @@ class LiveSignals:
             pdc = np.concatenate([self._seen.pdc, pdc])[: self._most] if both else None
         count = len(electrodes)
         return Recording(
-            rows.name, rows.path, rows.layout, np.arange(count) / self._rate, 0.0, electrodes, np.arange(count),
+            rows.name, rows.path, rows.layout, np.arange(count) / self.rate, 0.0, electrodes, np.arange(count),
             np.zeros(count, np.uint16), pdc=pdc, about=rows.about, sensor=self._sensor,
         )  # fmt: skip
 
@@ -192,11 +200,12 @@ class View:
     signals : `LiveSignals`, rest and polarity so far; frames, passed : number of rows that arrived, and were skipped"""
 
     def __init__(
-        self, tools: Tools, rate: float, options: PrepareOptions | None = None, unit: ElectrodeGains | None = None
-    ) -> None:
-        """Make a view of a recording. rate : Hz; options, unit : see `LiveSignals`"""
+        self, tools: Tools, rate: float | None, options: PrepareOptions | None = None,
+        unit: ElectrodeGains | None = None,
+    ) -> None:  # fmt: skip
+        """Make a view of a recording. rate : Hz, or None; options, unit : see `LiveSignals`"""
         self.signals = LiveSignals(rate, options, unit, tools.translator.source)
-        self._tools, self._rate = tools, rate
+        self._tools = tools
         self._track = ForwardTracker()
         tools.drawer.warm_up()  # else the first row would wait a second for it
         self.frames, self.passed = 0, 0
@@ -215,7 +224,7 @@ class View:
         signals = self.signals.signals(self._counts[None], pdc)
         drawer, translator = self._tools.drawer, self._tools.translator
         evidence = translator.encode(signals)
-        state = self._track(evidence, self.frames / self._rate) if translator.answer.follows else None
+        state = self._track(evidence, self.frames / self.signals.rate) if translator.answer.follows else None
         translation = translator.decode(signals, evidence, state)
         gel = drawer.gel(vars(translation))["displacement_digit"]
         with folds_counted():  # a line for each such picture would hide the latencies

@@ -25,7 +25,10 @@ from .live_view import Shown, View
 
 MOST = 2**24  # bytes taken at a time, so that a file that is long already costs bounded memory
 MAX_LINE = 2**20
-FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that stumbles, or a cable that is touched
+LAST = 256  # bytes by which a file is known that grew
+# Rows, 0.3 s, that come together at first, so that their stamps tell the rate, and of which any number may be bad at
+# once: a program that stumbles, or a cable that is touched.
+FEW = 30
 
 
 class Growing:
@@ -37,7 +40,7 @@ class Growing:
         Raises TactileError if there is no such file."""
         file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
-        self._place, self._rest, self._lines = 0, b"", 0
+        self._place, self._rest, self._lines, self._last = 0, b"", 0, b""
         self._header: Header | None = None
         self.rows, self.bad = 0, 0  # that came; of them passed over
         if not self._path.is_file():
@@ -45,11 +48,14 @@ class Growing:
         self._file = self._path.stat()
 
     def poll(self) -> Recording | None:
-        """Return the rows since the last call; None if there are none, or if too many of them are bad.
+        """Return the rows since the last call, at first some together; None if there are none, or too many are bad.
 
-        Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row of
-        another sensor, and if over a fifth of all rows is bad. A bad cell among good rows is NaN."""
+        Raises TactileError for a file that became shorter, was written anew or is another one, for one that is no
+        recording, for a row of another sensor, and if over a fifth of all rows is bad. A bad cell among good
+        rows is NaN."""
         data = self._new_bytes()
+        if not data:
+            return None
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
         if len(self._rest) > MAX_LINE:
             raise TactileError(self._path, f"a line of over {MAX_LINE // 2**20} MB", "a line for each frame")
@@ -62,12 +68,17 @@ class Growing:
                 return None
             self._header = Header.parse(str(self._path), lines)
         table = read_lines(str(self._path), self._header, whole + end, self._lines)
+        if table is not None:
+            read = table_reader(str(self._path), table.header, self._columns, self._sensor, self._finger)
+            if not self.rows and len(table.lines) < FEW:
+                self._rest = whole + end + self._rest
+                return None
         self._lines += whole.count(b"\n") + 1
         if table is None:
             return None
         self.rows += len(table.lines)
         try:
-            return table_reader(str(self._path), table.header, self._columns, self._sensor, self._finger)(table)
+            return read(table)
         except BadRows:
             self.bad += len(table.lines)
             if self.bad > max(FEW, MAX_BAD_SHARE * self.rows):
@@ -84,12 +95,15 @@ class Growing:
             if size == self._place:
                 return b""
             with outside.open_file(self._path, "a CSV file that grows") as file:
-                file.seek(self._place)
-                data = file.read(MOST)
+                file.seek(self._place - len(self._last))
+                data = file.read(len(self._last) + MOST)
         except OSError as error:
             raise TactileError(self._path, error.strerror or str(error), "a readable file") from error
-        self._place += len(data)
-        return data
+        if not data.startswith(self._last):
+            raise TactileError(self._path, "was written anew", "a file that grows", "Watch it again")
+        new, self._last = data[len(self._last) :], data[-LAST:]
+        self._place += len(new)
+        return new
 
 
 POLL = 0.002  # s between two looks at the file
@@ -155,18 +169,25 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
 def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
     """Yield the rows of a finished recording at their times, one part in memory at a time.
     speed : times as fast as recorded, 0 without waiting; say : called with warnings; others : see `followed`"""
-    began = time.perf_counter()
+    began, last = time.perf_counter(), 0.0
     for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated
+        if np.isnan(recording.time).all():
+            found, advice = "snapshots, which do not follow each other", "Translate them: convert --frames-apart"
+            raise TactileError(path, found, "frames in order", advice)
+        steps = np.diff(recording.time, prepend=recording.time[:1])
+        due_at = np.cumsum(np.where(steps >= 0, steps, 1 / recording.rate))  # s; a clock that is set back goes on here
+        due_at += last - due_at[max(done - 1, 0)]
+        last = due_at[-1]
         for warning in recording.warnings if not done else ():
             say(f"warning: {warning}")
         while done < len(recording):
-            ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0
+            ahead = due_at[done] / speed - (time.perf_counter() - began) if speed else 0.0
             if ahead > LONGEST_WAIT:
                 say(f"nothing for {ahead:.0f} s before frame {done}: skipped")
                 began -= ahead
             passed = speed * (time.perf_counter() - began)
-            due = done + 1 if speed == 0 else int(recording.time.searchsorted(passed, side="right"))
+            due = done + 1 if speed == 0 else int(due_at.searchsorted(passed, side="right"))
             if due <= done:
                 time.sleep(POLL)
                 continue

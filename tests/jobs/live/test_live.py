@@ -45,7 +45,7 @@ class Clock:
 
 
 def test_rows_come_once_and_whole_however_the_file_grows(slide_csv, tmp_path):
-    path = slide_csv(frames=80)
+    path = slide_csv(frames=120)
     data, whole = path.read_bytes(), recordings.read(path).electrodes
     path.write_bytes(b"")
     growing, found, place = live.Growing(path), [], 0
@@ -66,6 +66,13 @@ def test_a_file_that_becomes_shorter_and_one_that_is_no_recording_are_told(slide
     growing.poll()
     path.write_bytes(b"")
     with pytest.raises(TactileError, match="became shorter"):
+        growing.poll()
+    path = slide_csv(frames=5)
+    growing = live.Growing(path)
+    growing.poll()
+    slide_csv("other", frames=90)
+    path.write_bytes((tmp_path / "other.csv").read_bytes().replace(b"3", b"4"))
+    with pytest.raises(TactileError, match="written anew"):
         growing.poll()
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(TactileError, match="no known recording"):
@@ -89,7 +96,7 @@ def test_a_bad_row_is_passed_over_and_many_are_not(slide_csv):
         assert len(growing.poll()) == 1
     assert (growing.rows, growing.bad) == (34, 2)
     with pytest.raises(TactileError, match="rows are bad"):
-        for _ in range(20):
+        for _ in range(30):
             with open(path, "ab") as file:
                 file.write(bad)
             growing.poll()
@@ -111,6 +118,41 @@ def test_what_is_played_comes_at_its_own_rate(slide_csv, tmp_path):
     words = ["watch", str(tmp_path / "fast.npz"), "--play", "--speed", "0", "--out", str(tmp_path / "now.png")]
     assert main([*words, "--tare", "1200:1500"]) == 0  # of the first 10 s, which are 2,000 frames
     assert main([*words, "--tare", "1200:1500", "--rate", "100"]) == 2
+
+
+def test_a_growing_file_s_first_stamps_tell_its_rate(slide_csv):
+    path = slide_csv(frames=90)
+    head, *lines = path.read_text().splitlines(keepends=True)
+    path.write_text(head)
+    growing, signals, found = live.Growing(path), live.LiveSignals(None), []
+    for number, line in enumerate(lines):
+        with open(path, "a") as file:
+            file.write(f"{number / 25:.2f},{line.split(',', 1)[1]}")  # 25 Hz
+        rows = growing.poll()
+        if rows is not None:
+            signals.learn(rows)
+            found.append(len(rows))
+    assert signals.rate == pytest.approx(25.0) and sum(found) == 90 and found[1:] == [1] * (len(found) - 1)
+
+
+@pytest.mark.parametrize(("until", "step"), [(90, -5.0), (60, 3600.0)])
+def test_a_clock_that_is_set_leaves_no_frame_out(slide_csv, tmp_path, monkeypatch, capsys, until, step):
+    electrodes = recordings.read(slide_csv(frames=90)).electrodes
+    stamps = np.arange(90) / 100
+    stamps[30:until] += step
+    np.savez(tmp_path / "set.npz", electrodes=electrodes, time=stamps)
+    monkeypatch.setattr(playback, "time", clock := Clock())
+    assert main(["watch", str(tmp_path / "set.npz"), "--play", "--out", str(tmp_path / "now.png")]) == 0
+    assert ", 0 frames passed over" in capsys.readouterr().out
+    assert 0.8 < clock.slept < 1.0
+
+
+def test_snapshots_are_not_played(tmp_path, capsys):
+    names = [f"{finger}_biotac_{k}" for finger in ("ff", "mf", "th") for k in range(1, 25)]
+    rows = np.random.default_rng(0).integers(2900, 3100, (3, 72))
+    np.savetxt(tmp_path / "grasps.csv", rows, fmt="%d", delimiter=",", header=",".join(names), comments="")
+    assert main(["watch", str(tmp_path / "grasps.csv"), "--play", "--out", str(tmp_path / "now.png")]) == 2
+    assert "snapshots" in capsys.readouterr().err
 
 
 def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
