@@ -12,6 +12,7 @@ import contextlib
 import json
 import os
 import re
+import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -56,7 +57,8 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
     out = Path(out)
     seen: dict[str, str | os.PathLike] = {}
     for recording in recordings:
-        name = name_of(recording).casefold()  # macOS and Windows fold case in file names
+        # macOS and Windows fold case in file names, macOS the two ways to write an accent, too.
+        name = unicodedata.normalize("NFC", name_of(recording)).casefold()
         if name in seen:
             found, advice = f"has the same name as {seen[name]}", "Convert them into different --out folders"
             raise TactileError(recording, found, "one name for each result folder", advice)

@@ -18,8 +18,9 @@ def test_two_recordings_of_one_name_are_refused(tmp_path):
     with pytest.raises(TactileError, match="same name") as error:
         results.result_folders(["day1/touch.csv", "day2/Touch.h5"], tmp_path, False)
     assert "day1" in str(error.value) and "day2" in str(error.value)
-    with pytest.raises(TactileError, match="same name"):
-        results.result_folders(["touch.csv", "touch.csv"], tmp_path, True)
+    for pair in (["touch.csv", "touch.csv"], ["a/\u00e9.csv", "b/e\u0301.csv"]):  # an accent, written in two ways
+        with pytest.raises(TactileError, match="same name"):
+            results.result_folders(pair, tmp_path, True)
 
 
 def test_an_older_result_needs_overwrite_and_other_folders_are_never_replaced(tmp_path):

@@ -79,9 +79,8 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
 def _names(folder: Path) -> list[str]:
     """Return the paths of all files below a folder, relative to it, sorted, without hidden ones."""
     found = []
-    for place, folders, names in os.walk(folder, onerror=inputs.passed_over):
-        folders[:] = [name for name in folders if not name.startswith(".")]
-        found += [Path(place, name).relative_to(folder).as_posix() for name in names if not name.startswith(".")]
+    for place, _, names in inputs.walked(folder):
+        found += [Path(place, name).relative_to(folder).as_posix() for name in names]
     return sorted(found)
 
 

@@ -106,20 +106,33 @@ def _lines(file: Path) -> list[tuple[int, str]]:
 
 
 def _of_folder(folder: Path) -> Iterator[Path]:
-    """Yield the recordings in a folder and below, by name, without linked folders; log unreadable ones."""
+    """Yield the recordings in a folder and below, by name; log linked and unreadable folders, and links to nothing."""
     if _is_bag(folder):
         yield folder
         return
-    for place, folders, names in os.walk(folder, onerror=passed_over):
+    for place, folders, names in walked(folder):
         bags = [name for name in folders if _is_bag(Path(place, name))]
-        folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
+        folders[:] = sorted(name for name in folders if name not in bags)
         beside = BESIDE if any(name.endswith(SLIDE) for name in names) else ()
-        files = [name for name in names if name.lower().endswith(FOLDER_ENDINGS) and not name.startswith(".")]
+        files = [name for name in names if name.lower().endswith(FOLDER_ENDINGS)]
         for name in sorted([*bags, *(name for name in files if not name.endswith(beside))]):
-            yield Path(place) / name
+            if os.path.exists(os.path.join(place, name)):
+                yield Path(place) / name
+            else:
+                log.warning("%s: a link that leads nowhere, passed over", os.path.join(place, name))
 
 
-def passed_over(error: OSError) -> None:
+def walked(folder: Path) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield what `os.walk` does, without hidden folders and files; linked and unreadable folders are logged."""
+    for place, folders, names in os.walk(folder, onerror=_passed_over):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        for path in (os.path.join(place, name) for name in folders):
+            if os.path.islink(path) and not _is_bag(Path(path)):
+                log.warning("%s: a linked folder, passed over; copy it, or name it apart", path)
+        yield place, folders, [name for name in names if not name.startswith(".")]
+
+
+def _passed_over(error: OSError) -> None:
     """Log a warning for a folder that `os.walk` would skip silently."""
     log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
 

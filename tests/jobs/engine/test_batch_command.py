@@ -86,6 +86,15 @@ def test_a_folder_that_may_not_be_read_is_passed_over(name, recordings, tmp_path
     assert told or name == "stat"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows lets administrators alone make links")
+def test_links_in_a_folder_that_lead_nowhere_or_to_folders_are_told(recordings, tmp_path, caplog):
+    folder = recordings[0].parent
+    (folder / "circle.csv").symlink_to("circle.csv")
+    (folder / "more").symlink_to(tmp_path)
+    assert inputs.find([str(folder)], tmp_path / "out") == recordings
+    assert "circle.csv: a link that leads nowhere" in caplog.text and "more: a linked folder" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
