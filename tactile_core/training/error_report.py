@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,18 @@ class Measure:
         """Return signed signals (C, e) counts, with noise, of contacts ``rows`` (C,); stream : number that seeds it"""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
+    @cached_property
+    def silence(self) -> dict[str, np.ndarray]:
+        """Largest displacements biotac_m and digit_m, and force_N, all (T,), of T frames of noise, each alone."""
+        signal = self.networks.encode_signal(self.read(np.full(SILENT_FRAMES, SILENT), 3))
+        state = self.networks.contact(signal)
+        biotac, digit = self.networks.latents(signal, state)
+        return {
+            "biotac_m": accuracy.lengths(self.networks.decode_source(biotac)).max(-1),
+            "digit_m": accuracy.lengths(self.networks.decode_target(digit)).max(-1),
+            "force_N": accuracy.lengths(self.networks.force_in(state, biotac)),
+        }
+
 
 def error_rows(measure: Measure, model: Model) -> list[Row]:
     """Return the card's rows of errors (`accuracy.row`) for each step, the chain and the direct network."""
@@ -90,30 +103,16 @@ def signal_rows(measure: Measure) -> list[Row]:
     return [metric_row("SVB_rms_counts", value, baseline, None, "test presses")]
 
 
-def silence(measure: Measure) -> dict[str, np.ndarray]:
-    """Translate T frames of noise, each alone; return (T,) largest displacements biotac_m, digit_m, and force_N."""
-    nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
-    signal = nets.encode_signal(change)
-    state = nets.contact(signal)
-    biotac, digit = nets.latents(signal, state)
-    return {
-        "biotac_m": accuracy.lengths(nets.decode_source(biotac)).max(-1),
-        "digit_m": accuracy.lengths(nets.decode_target(digit)).max(-1),
-        "force_N": accuracy.lengths(nets.force_in(state, biotac)),
-    }
-
-
 def silence_rows(measure: Measure) -> list[Row]:
     """Return report rows of mean motion, um, and force, N, in frames without contact; the baseline is 0."""
-    values = silence(measure)
-    largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
-    named = [*largest, ("silence_force_N", values["force_N"])]
+    largest = [(f"silence_{name}_max_um", 1e6 * measure.silence[f"{name}_m"]) for name in SURFACES]
+    named = [*largest, ("silence_force_N", measure.silence["force_N"])]
     return [metric_row(name, accuracy.mean(value), 0.0, None, "noise alone") for name, value in named]
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Return the quantiles of `silence` by its names, and "levels", their shares: smaller results may be noise."""
-    return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
+    """Return quantiles of `Measure.silence` by its names, and "levels", their shares: smaller results may be noise."""
+    return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in measure.silence.items()}}
 
 
 def quantiles(values: np.ndarray) -> list[float]:

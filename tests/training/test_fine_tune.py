@@ -42,7 +42,7 @@ def test_it_learns_the_sensor(arrays, tmp_path, capsys, monkeypatch):
 
 def test_same_bytes_again(arrays, tmp_path, monkeypatch):
     monkeypatch.setattr(fine_tuning, "EPOCHS", 1)
-    path = write_labelled(tmp_path / "labelled.hdf5", arrays)
+    path = write_labelled(tmp_path / "labelled.hdf5", {name: values[:600] for name, values in arrays.items()})
     for name in ("a", "b"):
         fine_tune(path, tmp_path / name)
     first, second = ((tmp_path / name / "weights" / "card.json").read_bytes() for name in ("a", "b"))

@@ -43,7 +43,8 @@ def pairs(tmp_path, monkeypatch):
     return path
 
 
-def test_networks_are_as_wide_as_the_sensor_has_electrodes(pairs, tmp_path):
+def test_networks_are_as_wide_as_the_sensor_has_electrodes(pairs, tmp_path, monkeypatch):
+    monkeypatch.setattr("tactile_core.training.train.draw_losses", lambda path, history: None)  # test_train has it
     read = read_pairs(pairs)
     assert read.pair == (NAME, "digit") and read.signal.shape[1] == COUNT == sensors.electrode_count(NAME)
     out = tmp_path / "out"
