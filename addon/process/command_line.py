@@ -91,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("--contacts", type=int, choices=(1, 2), default=1, help="looked for in a frame (default: 1)")
         verb.add_argument("--ball", type=float, default=0.0, metavar="MM", help="known to touch: solved; a plate: 2000")
         verb.add_argument("--to", choices=gels, help="gel of recordings (default: the weights')")
-        verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")
+        verb.add_argument("--frames", default=":", help="of recordings, or of a .blend to render: A:B:STEP")
         verb.add_argument("--seed", type=int, default=0, help="of simulated noise")
         verb.add_argument("--overwrite", action="store_true", help="write into result folders that exist")
         verb.set_defaults(verb=name)
@@ -161,8 +161,22 @@ def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
         raise TactileError(path, "there is no such file", "a .blend", "Check the path")
     bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))
     bpy.context.view_layer.objects.active = None  # F12 renders the camera's gel, not the active one's
+    _choose(options.frames)
     _claimed(folder, options)
     _pictures(folder, options)
+
+
+def _choose(text: str) -> None:
+    """Limit the opened scene to frames A:B, by Blender's numbers, which are the recording's. Raises TactileError if it
+    plays none of them."""
+    scene, frames = bpy.context.scene, parse_frames(text)
+    if frames.start is None and frames.stop is None:
+        return
+    chosen = [each for each in range(scene.frame_end + 1)[frames.start : frames.stop] if each >= scene.frame_start]
+    if not chosen:
+        expected = f"some of {scene.frame_start} to {scene.frame_end}, which the scene plays"
+        raise TactileError("--frames", f"{text} takes none", expected, "Widen it")
+    scene.frame_start, scene.frame_end = chosen[0], chosen[-1]
 
 
 def _for(path: Path) -> Callable:

@@ -18,7 +18,11 @@ def run(part, scene):
 def test_convert_writes_a_blend_and_pictures_and_render_draws_them(run, slide_csv, tmp_path):
     assert run("convert", slide_csv(), "--out", tmp_path / "out", "--pictures", "--frames", "60:66:3") == 0
     assert run("render", tmp_path / "out" / "touch" / "touch.blend", "--out", tmp_path / "again") == 0
-    for folder, frames in (("out", (60, 63)), ("again", range(60, 64))):  # render draws all that the scene plays
+    words = ["render", tmp_path / "out" / "touch" / "touch.blend", "--out"]
+    assert run(*words, tmp_path / "some", "--frames", "61:63") == 0
+    assert run(*words, tmp_path / "none", "--frames", "70:80") == 1 and not (tmp_path / "none").exists()
+    pictures = {"out": (60, 63), "again": range(60, 64), "some": (61, 62)}  # render draws all that the scene plays
+    for folder, frames in pictures.items():
         names = sorted(path.name for path in (tmp_path / folder / "touch" / "images").iterdir())
         assert names == [f"{frame:04d}.png" for frame in frames]
 
