@@ -35,6 +35,19 @@ def seed_4(tmp_path_factory):
     return folder / "short.h5"
 
 
+@pytest.fixture
+def asked(monkeypatch):
+    """What the solver is asked for, (sensor, force, tier); the fast tier answers, test_solve.py has the others."""
+    solve, found = recording_room.solve, []
+
+    def fast(sensor, *where, force, tier, friction):
+        found.append((sensor, force, tier))
+        return solve(sensor, *where, force=force, tier="fast", friction=friction)
+
+    monkeypatch.setattr(recording_room, "solve", fast)
+    return found
+
+
 def test_recording_carries_its_truth(seed_4):
     recording = recordings.read(seed_4)
     assert recording.simulated and len(recording) == 61
@@ -71,13 +84,11 @@ def test_tractions_of_a_finer_tier_are_refused_before_it_begins(scene, tmp_path)
         simulate_recording(scene, tmp_path / "x.h5", keep=("traction_digit",), tiers={"digit": "full"})
 
 
-def test_a_press_that_comes_again_is_solved_once(tmp_path, monkeypatch):
-    solve, asked = recording_room.solve, []
-    monkeypatch.setattr(recording_room, "solve", lambda *of, **how: asked.append(how["force"]) or solve(*of, **how))
+def test_a_press_that_comes_again_is_solved_once(tmp_path, asked):
     down_and_up = ball_scene((0.0, -8.0, 0.0, 0.0), (0.03, -8.0, 0.0, 0.3), (0.06, -8.0, 0.0, 0.0))
     (tmp_path / "scene.toml").write_text(down_and_up, encoding="utf-8")
     simulate_recording(tmp_path, tmp_path / "gel.h5", keep=("displacement_digit",))
-    assert asked == pytest.approx([0.1, 0.2, 0.3])
+    assert [force for _, force, _ in asked] == pytest.approx([0.1, 0.2, 0.3])
     moved = read_truth(tmp_path / "gel.h5")[1].displacement_digit
     np.testing.assert_array_equal(moved[1], moved[5])
 
@@ -132,25 +143,9 @@ def test_a_place_off_the_gel_names_the_point(scene, tmp_path):
         simulate_recording(scene, tmp_path / "x.h5")
 
 
-@pytest.fixture
-def unsolved(monkeypatch):
-    """``unsolved("digit")``: solving a contact on that sensor fails the test."""
-
-    def forbid(sensor):
-        solve = recording_room.solve
-
-        def guarded(name, *given, **named):
-            assert name != sensor
-            return solve(name, *given, **named)
-
-        monkeypatch.setattr(recording_room, "solve", guarded)
-
-    return forbid
-
-
-def test_electrodes_alone_need_no_digit(scene, seed_4, tmp_path, unsolved):
-    unsolved("digit")
+def test_electrodes_alone_need_no_digit(scene, seed_4, tmp_path, asked):
     simulate_recording(scene, tmp_path / "x.h5", seed=4, keep=("electrodes",))
+    assert {sensor for sensor, *_ in asked} == {"biotac"}
     whole, part = recordings.read(seed_4), recordings.read(tmp_path / "x.h5")
     np.testing.assert_array_equal(part.electrodes, whole.electrodes)
     np.testing.assert_array_equal(part.truth.force, whole.truth.force)
@@ -158,9 +153,9 @@ def test_electrodes_alone_need_no_digit(scene, seed_4, tmp_path, unsolved):
     assert "truth (force)" in info.describe(tmp_path / "x.h5")
 
 
-def test_the_gel_alone_needs_no_biotac(scene, seed_4, tmp_path, unsolved):
-    unsolved("biotac")
+def test_the_gel_alone_needs_no_biotac(scene, seed_4, tmp_path, asked):
     simulate_recording(scene, tmp_path / "x.h5", keep=("displacement_digit",))
+    assert {sensor for sensor, *_ in asked} == {"digit"}
     time, truth = read_truth(tmp_path / "x.h5")
     whole = recordings.read(seed_4)
     np.testing.assert_array_equal(time, whole.time)
@@ -173,16 +168,7 @@ def test_the_gel_alone_needs_no_biotac(scene, seed_4, tmp_path, unsolved):
         recordings.read(tmp_path / "x.h5")
 
 
-def test_each_sensor_is_solved_by_its_tier(scene, tmp_path, monkeypatch):
-    """All by the fast one here: test_solve.py has the full one's numbers beside it."""
-    solve, asked = recording_room.solve, set()
-
-    def fast(sensor, *where, tier, **how):
-        asked.add((sensor, tier))
-        return solve(sensor, *where, tier="fast", **how)
-
-    monkeypatch.setattr(recording_room, "solve", fast)
-    simulate_recording(
-        scene, tmp_path / "full.h5", keep=("displacement_biotac", "displacement_digit"), tiers={"digit": "full"}
-    )
-    assert asked == {("biotac", "fast"), ("digit", "full")}
+def test_each_sensor_is_solved_by_its_tier(scene, tmp_path, asked):
+    keep = ("displacement_biotac", "displacement_digit")
+    simulate_recording(scene, tmp_path / "full.h5", keep=keep, tiers={"digit": "full"})
+    assert {(sensor, tier) for sensor, _, tier in asked} == {("biotac", "fast"), ("digit", "full")}

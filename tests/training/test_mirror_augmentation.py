@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small_pairs import frame, write_pairs
+from small_pairs import BASES, frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
@@ -68,7 +68,7 @@ def test_mirrored_electrodes_read_what_those_on_the_other_side_do(sides):
 def test_half_of_what_is_trained_on_is_mirrored_and_silence_is_not(tmp_path):
     path = write_pairs(tmp_path / "pairs.h5")
     pairs = read_pairs(path)
-    options = Options(wide_biotac=4, near_biotac=4, half_biotac=3, wide_digit=4, near_digit=4, half_digit=3)
+    options = Options(**BASES)
     flat = {"biotac": frame("digit", 3), "digit": frame("digit", 3)}
     both = {**vars(pairs), "displacement_biotac": pairs.displacement_digit}
     contacts = Contacts(type(pairs)(**both), split_presses(pairs.press, 0, path), options, flat, torch.Generator())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small_pairs import frame, write_pairs
+from small_pairs import BASES, frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
@@ -13,8 +13,7 @@ from tactile_core.training.options import Options, device_of, label  # noqa: E40
 from tactile_core.training.stages import STAGES, Model  # noqa: E402
 from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
 
-SIZES = {"wide_biotac": 4, "near_biotac": 4, "half_biotac": 3, "wide_digit": 4, "near_digit": 4, "half_digit": 3}
-OPTIONS = Options(**SIZES, width=16, latent_biotac=6, latent_digit=7, mirrored=0)
+OPTIONS = Options(**BASES, width=16, latent_biotac=6, latent_digit=7, mirrored=0)
 ELSEWHERE = torch.device("meta")  # holds no numbers, and refuses to be mixed with the processor's as a GPU does
 
 

@@ -35,14 +35,14 @@ def test_uncompiled_grids_are_the_same(compiled_loops):
 def test_slender_triangles_are_cut_along_their_length(monkeypatch):
     """Pieces grow as length over cell, not its square; of so many long triangles that they do not fit, cells grow."""
     triangles = trimesh.creation.cylinder(5.0, 30.0, sections=1000).triangles
-    for cell, most_cells in ((0.1, mesh_distance._LONGEST), (0.2, mesh_distance._LONGEST // 10)):
+    usual, cell = mesh_distance._LONGEST, 0.2
+    for most_cells in (usual, usual // 10):
         monkeypatch.setattr(mesh_distance, "_LONGEST", most_cells)
-        grown = cell > 0.1
         near = NearTriangles(triangles, cell)
         longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
         rows = np.ceil(np.log2(longest / cell) + 0.5)
         most = 2 * (2**rows).sum()  # each is halved until its edges fit; beside its shortest, both at once
-        assert len(near.middles) <= (0.5 * most if grown else most)
+        assert len(near.middles) <= (most if most_cells == usual else 0.5 * most)
         assert len(near.middles) < 3 * most_cells
         random = np.random.default_rng(0)
         angle, height = random.uniform(0, 2 * np.pi, 100), random.uniform(-14, 14, 100)
