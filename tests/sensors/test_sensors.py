@@ -5,6 +5,7 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.sensors import unrolling
+from tactile_core.sensors.calibration_file import load_calibration
 
 RMS_LIMIT = 0.05e-3  # m, a target
 
@@ -94,14 +95,15 @@ def test_skin_is_closed_and_as_thick_as_published():
     assert thickness.min() > 1.50e-3 and thickness.max() < 1.63e-3  # the published range (docs/sources.md, BioTac skin)
 
 
-def test_window_of_the_gel_is_an_even_grid():
-    gel = sensors.digit_surface()
-    window = gel.window_rest
-    x, z = window[:, 0, 0], window[0, :, 2]
-    np.testing.assert_allclose(window[..., 0], np.broadcast_to(x[:, None], window.shape[:2]), atol=1e-12)
-    np.testing.assert_allclose(window[..., 2], np.broadcast_to(z, window.shape[:2]), atol=1e-12)
-    np.testing.assert_allclose(np.diff(x), np.diff(x)[0], rtol=1e-9)
-    np.testing.assert_allclose(np.diff(z), np.diff(z)[0], rtol=1e-9)
+@pytest.mark.parametrize("name", ["digit", "gelsight_mini"])
+def test_a_gel_s_window_is_an_even_grid_that_holds_the_picture(name):
+    window, camera = sensors.sensor_surface(name).window_rest, load_calibration(None, name).camera
+    x, z = window[..., 0], window[..., 2]
+    assert max(np.ptp(x, axis=1).max(), np.ptp(z, axis=0).max()) < 1e-12
+    for nodes, seen in ((x[:, 0], camera.gel_x), (z[0], camera.gel_z)):
+        steps = np.diff(nodes)
+        assert np.ptp(steps) < 1e-12 and 0 < steps[0] < 0.3501e-3
+        assert nodes[0] <= seen.min() and seen.max() <= nodes[-1]
 
 
 def test_lowest_points_of_both_sensors_coincide():
