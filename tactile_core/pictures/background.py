@@ -32,11 +32,14 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     """Return the picture (H, W, 3) float32, levels, of the untouched gel: the calibration's photograph, scaled by the
     modelled effect of LEDs or albedo changed since; without one the model's. radiance : (H, W, LED) levels, at rest
 
-    Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
+    Raises TactileError for a photograph that cannot be read, has another size than the camera's pictures, or is turned,
+    mirrored or blue first."""
+    own = by_led(unit, radiance).sum(-1)
     if not unit.photograph:
-        return by_led(unit, radiance).sum(-1)
+        return own
     photograph = read_photograph(unit.photograph, unit.camera).astype(np.float32)
     if unit.photographed in (None, (unit.leds, unit.coating.albedo)):
+        check_way(photograph, own, unit.photograph)
         return photograph
     leds, albedo = unit.photographed
     coating = dataclasses.replace(unit.coating, albedo=albedo)
@@ -97,16 +100,16 @@ def terms(most: int) -> Iterator[tuple[int, int]]:
             yield degree - j, j
 
 
-def check_way(picture: np.ndarray, own: np.ndarray) -> None:
-    """Raise TactileError for a background that is much more like the unit's own after its colours are exchanged or it
-    is turned or mirrored. picture, own : (H, W, 3) levels, the background and the unit's own"""
+def check_way(picture: np.ndarray, own: np.ndarray, where: str = "background") -> None:
+    """Raise TactileError, which names ``where``, for a background that is much more like the unit's own after its
+    colours are exchanged or it is turned or mirrored. picture, own : (H, W, 3) levels, it and the unit's own"""
     ways = {"as it is": picture, "picture[..., ::-1]": picture[..., ::-1], "picture[::-1, ::-1]": picture[::-1, ::-1]}
     ways |= {"picture[::-1]": picture[::-1], "picture[:, ::-1]": picture[:, ::-1]}
     alike = {way: _correlation(each, own) for way, each in ways.items()}
     best = max(alike, key=alike.__getitem__)
     if alike[best] > alike["as it is"] + MORE_ALIKE:
         found = f"like the calibration's ({alike['as it is']:.2f} as it is, {alike[best]:.2f} {best})"
-        raise TactileError("background", found, "red, green, blue, fingertip up", f"Give {best}, or calibrate the unit")
+        raise TactileError(where, found, "red, green, blue, fingertip up", f"Give {best}, or calibrate the unit")
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

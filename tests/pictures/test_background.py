@@ -40,6 +40,13 @@ def test_lights_that_are_off_or_doubled_act_on_a_photograph(unit):
     assert red[..., 2].mean() > 0.8 * photograph[..., 2].mean()
 
 
+@pytest.mark.parametrize("way", [np.s_[::-1], np.s_[:, ::-1], np.s_[..., ::-1]])
+def test_a_photograph_that_is_turned_mirrored_or_blue_first_is_refused(unit, way):
+    Image.fromarray(read_photograph(unit.photograph)[way].copy()).save(unit.photograph)
+    with pytest.raises(TactileError, match=r"as it is, \d\.\d\d picture"):
+        at_rest(unit)
+
+
 def test_a_moved_light_and_another_albedo_act_on_a_photograph(unit):
     photograph = at_rest(unit)
     moved = at_rest(unit, position=lambda led: (*led.position[:2], 1.2 * led.position[2]))
