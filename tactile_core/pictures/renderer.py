@@ -144,6 +144,7 @@ class Renderer:
         """Return each LED's radiance (H, W, LED) float32, levels, of what pixels see of a height_map (H, W) m.
         reflectance : (H, W), 0 black to 1 white, of the object behind; None for the calibration's"""
         if reflectance is not None:
+            self.calibration.check_shows("reflectance")
             grey = checked_reflectance(reflectance, "reflectance")
             reflectance = camera_array(grey, self.camera.shape, "reflectance")
         return self._spread_radiance(self._heights(height_map, "height map"), reflectance)

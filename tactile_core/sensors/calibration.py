@@ -237,6 +237,12 @@ class Calibration:
         """Light from an object through the coating that it touches, as a share of ``facing``."""
         return self.coating.transmission * self.object_reflectance
 
+    def check_shows(self, what: str) -> None:
+        """Raise TactileError, which names ``what``, if the coating shows nothing of an object behind it."""
+        if not self.coating.transmission:
+            found = f"given for {self.unit}, whose coating lets no light through (transmission 0)"
+            raise TactileError(what, found, "a calibration with transmission in [coating]", "Leave it out")
+
     def with_through(self, through: float) -> Calibration:
         """Return the unit with another ``through``, 0 to 1: by the object's reflectance and, if even a white object
         gives less, by a larger transmission of the coating."""

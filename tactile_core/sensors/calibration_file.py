@@ -39,7 +39,10 @@ def load_calibration(
 
     >>> renderer = tactile.Renderer(tactile.load_calibration("unit.toml"))"""
     if object_reflectance is not None:
-        return dataclasses.replace(load_calibration(path, sensor), object_reflectance=object_reflectance)
+        unit = dataclasses.replace(load_calibration(path, sensor), object_reflectance=object_reflectance)
+        if object_reflectance:
+            unit.check_shows("object reflectance")
+        return unit
     if path is None:
         return _shipped(describe(sensor or Camera.sensor).folder.name)
     file = Path(path_text(path, "load_calibration, path"))

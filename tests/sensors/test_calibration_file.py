@@ -177,3 +177,9 @@ def test_start_of_unlike_units_reads() -> None:
     start = load_calibration(Path(__file__).parents[2] / "scenes" / "calibrations" / "start.toml")
     assert not start.fit.photographs
     assert start.camera.shape == (320, 240)
+
+
+def test_a_reflectance_that_no_picture_shows_is_refused():
+    with pytest.raises(TactileError, match="lets no light through"):
+        load_calibration(None, "gelsight_mini", 0.5)
+    assert load_calibration(None, "gelsight_mini", 0.0).through == 0
