@@ -6,11 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from benchmarks.measure_presets import QUICK_PASSES, changes, converge, one_thread, rms
+from benchmarks.measure_presets import QUICK_PASSES, changes, converge, rms
 from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.pictures.height_map import gel_mapper
-from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.simulation.pairs_file import Pairs
@@ -62,8 +61,6 @@ def _contacts(count: int) -> Pairs:
 
 
 def _draw_truth(unit, mapper, pairs, passes, file) -> None:  # noqa: ANN001
-    variant = choose_variant().name
-    one_thread(variant)
     heights = list(mapper(true_displacement(pairs, "digit", np.arange(len(pairs.press)))))
-    drawn = converge(unit, heights, variant, dataclasses.replace(REFERENCE, passes=passes), seed=0)
+    drawn = converge(unit, heights, dataclasses.replace(REFERENCE, passes=passes), seed=0)
     np.savez(file, pictures=[full for _, full in drawn])

@@ -8,8 +8,7 @@ import time
 import numpy as np
 
 from benchmarks.measure_presets import QUICK_PASSES, changes, converge, fields, one_thread, rms
-from tactile_core.pictures.mitsuba.variant import choose_variant
-from tactile_core.pictures.presets import FAST, REFERENCE, preset_named
+from tactile_core.pictures.presets import FAST, REFERENCE
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
@@ -48,12 +47,10 @@ def of_preset(unit: Calibration, name: str) -> tuple[Renderer, str]:
 def _reference(unit: Calibration, heights: list[np.ndarray], quick: bool, truth: str) -> Method:
     """Measure the reference preset. Its error is its noise: by the difference of two seeds, over sqrt(2). Each seed's
     first time includes the picture at rest. heights : each (H, W) m; truth : file to write its pictures to"""
-    preset = dataclasses.replace(preset_named(REFERENCE.name), passes=QUICK_PASSES) if quick else REFERENCE
-    variant = choose_variant().name
-    one_thread(variant)
+    preset = dataclasses.replace(REFERENCE, passes=QUICK_PASSES) if quick else REFERENCE
     pictures, ms = [], []
     for seed, some in ((0, heights), (1, heights[:1])):
-        drawn = converge(unit, some, variant, preset, seed)
+        drawn = converge(unit, some, preset, seed)
         for _ in some:
             began = time.process_time()
             pictures.append(next(drawn)[1])
@@ -62,4 +59,4 @@ def _reference(unit: Calibration, heights: list[np.ndarray], quick: bool, truth:
     of = f"{len(true)} contact fields against the reference, {preset.passes} passes"
     np.savez(truth, pictures=true, of=of)
     noise = rms(other, true[:1]) / np.sqrt(2)
-    return Method("pictures", f"reference_{variant}", min(ms), mb, noise, "levels", rms(true), f"{of}: noise of a seed")
+    return Method("pictures", REFERENCE.name, min(ms), mb, noise, "levels", rms(true), f"{of}: noise of a seed")
