@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import math
 import re
@@ -69,15 +70,13 @@ class Answer:
         return (f"contacts lie {x:g} mm along x and {z:g} mm along z from their place on the DIGIT (--mount-shift)",)
 
 
-def parse_answer(
-    kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int, contacts: int = 1
-) -> Answer:  # fmt: skip
-    """Return the `Answer` that a command line's options give; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises
-    TactileError for a shift or a number of samples out of range."""
-    if not 0 <= samples <= MOST_SAMPLES:
-        raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")
-    shift = (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift)
-    return Answer(kind, frames_apart, shift, samples, contacts)
+def parse_answer(options: argparse.Namespace) -> Answer:
+    """Return the `Answer` that a command line's options give. Raises TactileError for a shift or a number of samples
+    out of range."""
+    if not 0 <= options.samples <= MOST_SAMPLES:
+        raise TactileError("--samples", str(options.samples), f"0 to {MOST_SAMPLES}")
+    shift = (0.0, 0.0) if options.mount_shift is None else parse_shift(options.mount_shift)
+    return Answer(options.answer, options.frames_apart, shift, options.samples, options.contacts)
 
 
 def parse_shift(text: str) -> tuple[float, float]:

@@ -67,16 +67,6 @@ class Evidence(Posterior):
 Read = Callable[[int, int], tuple[np.ndarray, Evidence]]
 
 
-class _Course(NamedTuple):
-    """Places on a path through the frames' components.
-    mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true if the path starts anew there"""
-
-    mean: np.ndarray
-    variance: np.ndarray
-    touched: np.ndarray
-    free: np.ndarray
-
-
 def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
     """Estimate the states (T, STATE) float32 of `Posterior` from all frames' evidence together: place smoothed forward
     and back, force by its smoothed ratio to the signals' size, depth from each frame alone. time : (T,) s"""
@@ -84,11 +74,11 @@ def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
         return np.zeros(evidence.mean.shape[::2], np.float32)
     elapsed = _elapsed(time)
     steps = np.minimum(_step(elapsed, evidence.rectified), ANYWHERE**2)
-    course = _best_course(_components(evidence), steps)
-    walk = np.where(course.free[:, None], ANYWHERE**2, steps[:, :PLACE])
-    state = _states(evidence, _smoothed(course.mean, course.variance, walk), course.touched)
-    ratio, touched = _log_ratio(state[:, PLACE], evidence.size), course.touched
-    apart = course.free | ~touched | ~np.concatenate([[False], touched[:-1]])
+    place, variance, touched, free = _best_course(_components(evidence), steps)
+    walk = np.where(free[:, None], ANYWHERE**2, steps[:, :PLACE])
+    state = _states(evidence, _smoothed(place, variance, walk), touched)
+    ratio = _log_ratio(state[:, PLACE], evidence.size)
+    apart = free | ~touched | ~np.concatenate([[False], touched[:-1]])
     walk = np.where(apart, ANYWHERE**2, np.minimum(_ratio_step(elapsed), ANYWHERE**2))
     even = _smoothed(ratio[:, None], np.full((len(ratio), 1), RATIO_NOISE**2), walk[:, None])[:, 0]
     state[touched, PLACE] = _force_of(even, evidence.size)[touched]
@@ -249,8 +239,9 @@ def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[n
     return score, came
 
 
-def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
-    """Return the best path through the components of frames; steps : (T, STATE), variances of `_step` before each"""
+def _best_course(frames: _Frame, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the best path through the components of frames: mean and variance (T, PLACE) of the places on it, a mask
+    (T,) of contact, and one of where it starts anew. steps : (T, STATE), variances of `_step` before each frame"""
     before, now = (_Frame(*(each[part] for each in frames)) for part in (slice(None, -1), slice(1, None)))
     moves, free = _moves(before, now, steps[1:])
     score, came = _scored(frames.weight[0], moves, now.weight)
@@ -261,7 +252,7 @@ def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
     each = np.arange(len(steps))
     begins = np.concatenate([[True], free[each[:-1], path[:-1], path[1:]]])
     mean, spread = (values[each, path, :PLACE] for values in frames[1:])
-    return _Course(mean, np.square(spread), touches(frames.mean[each, path]), begins)
+    return mean, np.square(spread), touches(frames.mean[each, path]), begins
 
 
 def _filtered(

@@ -16,7 +16,7 @@ from ..recordings import PrepareOptions, Recording, read
 from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains
 from ..recordings.force_file import read_force
 from ..recordings.polarity import spread_out
-from .translate import CHUNK, PreparedRows, RecordingPass
+from .translate import PreparedRows, translated_parts
 from .translator import Translator
 
 MOST_FRAMES = 3_000  # translated of a recording, evenly spread
@@ -139,9 +139,8 @@ def _translated(
     """Return times (n,) s and sizes (n,) N of the translated force in frames spread evenly over a recording."""
     frames = spread_out(len(recording), MOST_FRAMES)
     rows = PreparedRows(recording, frames, translator.answer, options, unit)
-    whole = RecordingPass(translator, rows.read, rows.count)
-    parts = np.split(frames, np.arange(CHUNK, len(frames), CHUNK))
-    return recording.time[frames], np.concatenate([accuracy.lengths(whole(part).translation.force) for part in parts])
+    parts = translated_parts(translator, rows, frames)
+    return recording.time[frames], np.concatenate([accuracy.lengths(part.force) for part in parts])
 
 
 def _scale(translated: np.ndarray, force: np.ndarray) -> float:

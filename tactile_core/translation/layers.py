@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outs
 NORM_EPSILON = 1e-5  # torch.nn.LayerNorm's default
 
 
-@dataclass(frozen=True)
-class SignalDistance:
+class SignalDistance(NamedTuple):
     """Distances of signals from the training signals; the card holds quantiles of each.
 
     mahalanobis : (T,) float32, Mahalanobis distance of the signal's latent from the training latents
@@ -30,7 +29,7 @@ class SignalDistance:
     largest: np.ndarray
 
 
-DISTANCES = tuple(field.name for field in fields(SignalDistance))
+DISTANCES = SignalDistance._fields
 
 
 def compress(change: np.ndarray) -> np.ndarray:

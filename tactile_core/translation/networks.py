@@ -214,7 +214,7 @@ class Networks:
             found[which] = self._map("R2MPN", seen, part)[which]
         return found
 
-    def _map(self, net: str, latent: np.ndarray, part: str = "map") -> np.ndarray:
+    def _map(self, net: str, latent: np.ndarray, part: str) -> np.ndarray:
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = tensors[f"{part}.first.weight"].shape[1]
         return in_blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)

@@ -32,16 +32,13 @@ Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and si
 
 
 class Decoded(NamedTuple):
-    """Frames of a recording after the networks.
-    frames : (T,) int, their indices in the recording; time : (T,) s; signals : what the networks were given
-    evidence : posterior of each frame by its own signals; translation : the result
-    state : (T, STATE), the contact's state as tracked through time; None if each frame is estimated alone"""
+    """T frames of a recording after the networks.
+    time : (T,) s; signals : what the networks were given; translation : the result
+    evidence : posterior of each frame by its own signals"""
 
-    frames: np.ndarray
     time: np.ndarray
     signals: Signals
     evidence: Evidence
-    state: np.ndarray | None
     translation: Translation
 
 
@@ -64,7 +61,7 @@ class RecordingPass:
             evidence, state = self._translator.encode(signals), None
         else:
             evidence, state = self._tracker(frames)
-        return Decoded(frames, time, signals, evidence, state, self._translator.decode(signals, evidence, state))
+        return Decoded(time, signals, evidence, self._translator.decode(signals, evidence, state))
 
 
 def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> RecordingPass:

@@ -83,8 +83,7 @@ class Translation(Summary):
     @classmethod
     def joined(cls, parts: Sequence[Translation]) -> Translation:
         """Join the parts, translations of successive frames, to one."""
-        names = [field.name for field in dataclasses.fields(cls)]
-        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
 def _rectified(signals: Signals) -> np.ndarray:
@@ -145,9 +144,9 @@ class Translator:
         rest = self.card.get(REST)
         return signals.typical if rest is None else signals.relative_to(np.array(rest))
 
-    def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
-        """Translate all frames of ``signals``; state : (T, STATE), tracked; None estimates each frame alone"""
-        return self.decode(signals, self.encode(signals), state)
+    def __call__(self, signals: Signals) -> Translation:
+        """Translate all frames of ``signals``, each alone."""
+        return self.decode(signals, self.encode(signals))
 
     def decode(self, signals: Signals, evidence: Evidence, state: np.ndarray | None = None) -> Translation:
         """Translate frames, given their evidence (of `encode`); a frame's numbers do not depend on its neighbours.
@@ -252,7 +251,7 @@ class Translator:
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Mark (T,) bool frames in which some `SignalDistance` exceeds that of the share `IN_RANGE` of validation
         contacts. change : (T, 19) counts; rectified : (T,) bool or one for all, true if signs are lost"""
-        return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
+        return np.any(self.nets.signal_distance(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 
     def _confidence(
         self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray, explained: np.ndarray
@@ -261,15 +260,10 @@ class Translator:
         without contact; flags : (T,). Each distance from the training's signals lowers it: by nothing up to the
         distance's 95 % quantile, to zero at the outermost."""
         usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
-        near = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
+        near = np.clip((far - self.nets.signal_distance(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         doubted = ((flags & np.uint16(UNTRAINED)) > 0) | bool(doubt(self.card))
         near[doubted] = np.minimum(near[doubted], UNTRAINED_CONFIDENCE)
         return (near * np.interp(np.nan_to_num(explained, nan=1.0), EXPLAINED, WITHIN)).astype(np.float32)
-
-    def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Return `SignalDistance` stacked, (distances, T), of change (T, e) counts, rectified (T,) or one for all."""
-        distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
-        return np.stack([getattr(distance, name) for name in DISTANCES])
 
     def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
         """Return the distances' quantiles over validation frames, (distances, T), or (distances, 1) if `rectified` is

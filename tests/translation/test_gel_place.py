@@ -7,7 +7,6 @@ import pytest
 
 from tactile_core import recordings, sensors
 from tactile_core.translation import gel_place, translate
-from tactile_core.translation.contact_track import Tracker
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +46,6 @@ def test_what_the_networks_make_of_noise_alone_shows_no_contact(shipped, gel):
     signals = recordings.prepare(shipped)
     noise = np.random.default_rng(5).normal(scale=1.5, size=signals.change.shape)  # counts: docs/sources.md, read-out
     silent = dataclasses.replace(signals, change=noise.astype(signals.change.dtype))
-    translator = translate.load_translator()
-
-    def posteriors(start, stop):
-        return shipped.time[start:stop], translator.encode(silent.at(np.arange(start, stop)))
-
-    every = np.arange(len(shipped))
-    moved = translator(silent, Tracker(posteriors, len(shipped))(every)[1]).displacement_digit
+    followed = translate.pass_over(translate.load_translator(), silent, shipped.time)
+    moved = followed(np.arange(len(shipped))).translation.displacement_digit
     assert not gel_place.contact_patch(moved, gel).any()

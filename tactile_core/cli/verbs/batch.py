@@ -172,9 +172,7 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
         sensor=None if options.sensor is None else electrode_gains.read(options.sensor),
         prepare=Prepare(**prepare_words(options)),
         target=options.target, preset=options.preset or "",
-        answer=parse_answer(
-            options.answer, options.frames_apart, options.mount_shift, options.samples, options.contacts
-        ),
+        answer=parse_answer(options),
         gel=options.gel, shard_frames=SHARD_FRAMES if options.shard_frames is None else options.shard_frames,
     )  # fmt: skip
     return translate_shards.completed(wanted, paths, say, options.weights, options.calibration)

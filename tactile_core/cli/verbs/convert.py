@@ -139,7 +139,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
 
     prepare = PrepareOptions(**prepare_words(options))
     keep = results.parse_words(options.keep, results.KEEPABLE, least=0)
-    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples, options.contacts)
+    answer = parse_answer(options)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     paths = readers.list_fingers(options.recordings, prepare.columns)
     source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
