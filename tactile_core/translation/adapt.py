@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -45,17 +45,11 @@ SHOWN = 3  # names spelled out
 LARGEST_OFFSET = 30.0  # counts; a larger one is a wrong match, not a tare error (assumed)
 
 
-@dataclass(frozen=True)
-class Adapted:
-    """Sensor file's entries for a fitted unit, with warnings for the user.
-    fitted : (19,) bool, true for electrodes whose gain was fitted
-    uncertainty : expected relative error of a gain, rms over electrodes, apart from a factor common to all; NaN if no
-        electrode has a gain"""
+class Adapted(NamedTuple):
+    """Sensor file's entries for a fitted unit, with warnings for the user."""
 
     sensor: ElectrodeGains
-    fitted: np.ndarray
     warnings: tuple[str, ...]
-    uncertainty: float
 
 
 def adapt(
@@ -71,9 +65,7 @@ def adapt(
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings, options) if rest is None else rest
-    bare = _bare(rest)
-    if bare is not None:
-        bare = msgspec.structs.replace(bare, film=_film(recordings, options, bare))
+    bare = None if rest is None else _bare(rest, recordings, options)
     for path, recording in zip(paths, recordings, strict=True):
         signals = Preparer(options, bare)(recording)
         if signals.kind == "scaled":
@@ -90,7 +82,7 @@ def adapt(
     if not restless:
         return fitted
     warning = f"no quiet part in {listed(restless, SHOWN)}: where the tare is off, so are the gains and offsets"
-    return dataclasses.replace(fitted, warnings=(warning, *fitted.warnings))
+    return Adapted(fitted.sensor, (warning, *fitted.warnings))
 
 
 def adapt_hand(
@@ -195,11 +187,11 @@ def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
     return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
 
 
-def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
-    if rest is None:
-        return None
+def _bare(rest: UnitRest, recordings: Sequence[Recording], options: PrepareOptions | None) -> ElectrodeGains:
+    """Return a unit's entry with its rest and film alone; the film is estimated from its recordings."""
     source = f"the {rest.recordings} least pressed recordings" if rest.recordings else "a recording without contact"
-    return _rest_alone(rest, f"rest from {source}")
+    bare = _rest_alone(rest, f"rest from {source}")
+    return msgspec.structs.replace(bare, film=_film(recordings, options, bare))
 
 
 def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:
@@ -220,9 +212,9 @@ def _fitted(
     try:
         found = fit(change, rectified, typical, f"{note}; {bare.note}")
     except TactileError as error:
-        return Adapted(bare, np.zeros(change.shape[1], bool), (f"no gains: {error}",), np.nan)
+        return Adapted(bare, (f"no gains: {error}",))
     fields = {name: getattr(bare, name) for name in ("rest_counts", "rest_spread_counts", "rest_pdc", "film")}
-    return dataclasses.replace(found, sensor=msgspec.structs.replace(found.sensor, **fields))
+    return Adapted(msgspec.structs.replace(found.sensor, **fields), found.warnings)
 
 
 def _contacts(signals: Signals) -> np.ndarray:
@@ -252,11 +244,11 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
         warnings.append(f"{named_electrodes(np.abs(found.offset) > LARGEST_OFFSET)}: no believable offset; taken as 0")
     signs = "rectified, so no offsets" if rectified else "signed"
     note = f"{note}; {frames} frames in contact ({signs}), {found.matched} different contacts"
-    uncertainty = _uncertainty(gain[fitted], found.matched)
     if fitted.any():
+        uncertainty = np.log(gain[fitted]).std() * (LEAST_LEFT + LEFT / np.sqrt(found.matched))
         note += f"; gains to about {uncertainty:.0%}"
     sensor = ElectrodeGains(note, [round(g, 4) for g in gain.tolist()], [round(o, 4) for o in offset.tolist()])
-    return Adapted(sensor, fitted, tuple(warnings), uncertainty)
+    return Adapted(sensor, tuple(warnings))
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
@@ -278,11 +270,3 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
         warnings.append("the fit did not settle: gains are uncertain")
     fitted = touched & ~wild
     return np.where(fitted, gain, 1.0), fitted, warnings
-
-
-def _uncertainty(gain: np.ndarray, contacts: int) -> float:
-    """Return the expected relative error of fitted gains (n,), by the number of different contacts; NaN if n is 0. gain
-    : (n,)"""
-    if not len(gain):
-        return np.nan
-    return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))
