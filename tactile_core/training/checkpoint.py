@@ -40,7 +40,7 @@ def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: tor
     if optimiser is not None:
         for index, values in optimiser.state_dict()["state"].items():
             arrays |= {f"optimiser/{index}/{name}": tensor.cpu().numpy() for name, tensor in values.items()}
-    text = {"identity": state.identity, "stage": state.stage, "epoch": state.epoch, "log": state.log}
+    text = {name: getattr(state, name) for name in TEXT}
     arrays["state"] = np.frombuffer(json.dumps(text).encode(), np.uint8)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)

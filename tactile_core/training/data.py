@@ -50,7 +50,7 @@ class Contacts:
     ) -> None:  # fmt: skip
         self.pairs, self.split, self.options = pairs, split, options
         self.device = device or torch.device("cpu")
-        self.depth = _depth(pairs)
+        self.depth = pairs.displacement_digit[:, :, 1].max(1) * np.float32(pairs.scale_digit)
         self.electrodes, self.rest = pairs.signal.shape[1], rest_counts(pairs.pair[0])
         self.biotac, self.digit = (
             SurfaceCodec(
@@ -98,11 +98,6 @@ class Contacts:
         """Return the pairs' indices (B,) of rows (B,), 0 for silent samples, and a mask (B,) of those mirrored."""
         contacts = len(self.pairs.press)
         return np.maximum(rows, 0) % contacts, rows >= contacts
-
-
-def _depth(pairs: Pairs) -> np.ndarray:
-    """Return the depth (C,) float32 m of each contact's deepest node of the gel."""
-    return pairs.displacement_digit[:, :, 1].max(1) * np.float32(pairs.scale_digit)
 
 
 def measured(

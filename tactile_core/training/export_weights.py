@@ -56,7 +56,7 @@ def export(
     silence = silence_quantiles(measure)
     card = {
         "format": CARD_FORMAT,
-        "nets": write_nets(folder, tensors, sizes),
+        "nets": {net: write_net(folder, net, own, sizes[net]) for net, own in tensors.items()},
         "signals": reference_signals.write(folder, typical),
         "polarity": FALLS,
         "units": UNITS,
@@ -119,7 +119,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
 def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
     """Return a surface's sizes for the card: rows, columns, half, nodes, and numbers of wide and near basis fields."""
     frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
-    lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}
+    lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.data.shape[1]}
     return {**lattice, "wide": wide, "near": near}
 
 
@@ -169,11 +169,6 @@ def versions(device: torch.device) -> dict[str, str]:
     }
 
 
-def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, object]]:
-    """Write a file of tensors for each network; return the card's entries by network: file, sha256, sizes, shapes."""
-    return {net: write_net(folder, net, own, sizes[net]) for net, own in tensors.items()}
-
-
 def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dict[str, int]) -> dict[str, object]:
     """Write the file of network `net`; return the card's entry: file, sha256, sizes, shapes.
     tensors : by their names in `networks.py`; sizes : numbers from `net_sizes`"""
@@ -186,11 +181,10 @@ def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dic
 def pairs_entry(contacts: Contacts) -> dict[str, object]:
     """Return the card's entry on the training data: origin, largest pressure, contacts and presses in each part."""
     pairs, split = contacts.pairs, contacts.split
-    parts = {"train": split.train, "validation": split.validation, "test": split.test}
     return {
         "sha256": pairs.sha256,
-        "contacts": {name: len(rows) for name, rows in parts.items()},
-        "presses": {name: len(np.unique(pairs.press[rows])) for name, rows in parts.items()},
+        "contacts": {name: len(rows) for name, rows in vars(split).items()},
+        "presses": {name: len(np.unique(pairs.press[rows])) for name, rows in vars(split).items()},
         "largest_pressure_Pa": float(f"{pairs.pressure[split.train].max():.6g}"),
         **{name: pairs.attributes[name] for name in ("scene", "seed", "version", "indenters", "electrodes")},
     }

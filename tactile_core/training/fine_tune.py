@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +35,7 @@ from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_
 from .export_weights import versions
 from .modules import ContactPosterior
 from .stages import FORCE_FLOOR
-from .train import deterministic, prepared_folder
+from .train import Progress, deterministic, prepared_folder, quiet
 
 # A place in millimetres reads as tens, in metres as hundredths: no fingertip is longer than half a metre.
 METRES_BELOW = 0.5
@@ -139,8 +138,6 @@ EPOCHS, BATCH, RATE = 30, 64, 2e-4  # a few passes at a low rate: the start is a
 HOLD = 0.3  # weight of the shape being held, against place and force, each about 1 at first (assumed)
 PLACE_FLOOR = 0.05  # half a cell of the lattice: smaller errors of the place count squared (assumed)
 
-Progress = Callable[[float, str], None]
-
 
 def fine_tune(
     path: str | os.PathLike,
@@ -164,7 +161,7 @@ def fine_tune(
     with prepared_folder(Path(out_folder), overwrite):
         net = "R2MPN" if data.rectified else "S2MPN"
         with deterministic():
-            state = _train(before, net, data, typical, seed, progress or (lambda share, text: None))
+            state = _train(before, net, data, typical, seed, progress or quiet)
         after = Networks(before.tensors | {net: state}, before.card)
         rows = [*_rows(before, data, "before"), *_rows(after, data, "after")]
         note = {
@@ -194,7 +191,7 @@ def _train(
     rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
     place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)
     with torch.no_grad():
-        held, kept = module(latent), _state_and_latent(module, rehearsed)
+        held, kept = _state_and_latent(module, latent)[:, STATE:], _state_and_latent(module, rehearsed)
         spread = kept.std(0).clamp(min=1e-3)
 
     def loss(rows: Tensor) -> Tensor:

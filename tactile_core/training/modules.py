@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..sensors import ELECTRODES
 from ..translation.card import PLACE, SIGNAL_HIDDEN, STATE
 from ..translation.layers import COUNT_SCALE, NORM_EPSILON
 from ..translation.networks import LEAST_SPREAD, SPREAD_LIMITS
@@ -90,10 +89,6 @@ class ContactPosterior(nn.Module):
     def given(self, latent: Tensor, state: Tensor) -> Tensor:
         """Map the signal's latent (B, K) and a state (B, STATE) to latent_biotac (B, L)."""
         return self.code(torch.cat([latent, state], -1))
-
-    def forward(self, latent: Tensor) -> Tensor:
-        """Map the signal's latent (B, K) to latent_biotac (B, L) of the most plausible contact."""
-        return self.given(latent, self.contact(latent))
 
     def contact(self, latent: Tensor) -> Tensor:
         """Map the signal's latent (B, K) to the state (B, STATE) of the likeliest contact: see `Posterior.likely`."""
@@ -180,7 +175,7 @@ class MeshVae(Vae):
             return self.surface.field(self.decoder(torch.cat([latent, left], -1)), cell)
 
 
-def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
+def signal_vae(latent: int, electrodes: int) -> Vae:
     """Return SVB, with the layers of ACROSS (a paper: docs/sources.md, Networks): electrodes + 1 inputs, 256, 128, 64,
     the latent, and back, on compressed signals. The last input says whether the signals are rectified."""
     encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))

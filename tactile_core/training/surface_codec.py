@@ -92,11 +92,6 @@ class SurfaceCodec:
         self.total, self.moving = _in_parts(self._sizes, every).T
         self.baseline = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
 
-    @property
-    def nodes(self) -> int:
-        """Number n of nodes."""
-        return self.data.shape[1]
-
     def _local(self, rows: np.ndarray) -> np.ndarray:
         """Return displacements (B, n, 3) float32 of contacts rows (B,), in ``unit`` m, in the nodes' own frames."""
         some, turned = self.data[rows % len(self.data)], rows >= len(self.data)
@@ -120,9 +115,8 @@ class SurfaceCodec:
         """Return what ``wide`` leaves of rows (B,) in the window, (B, 3w) mm, faded toward its edge, where decoded gel
         would have a step."""
         fade = torch.from_numpy(self.frame.fade())
-        return (
-            self._rest_in_window(rows, self._whole(rows)).view(len(rows), *fade.shape, 3) * fade[:, :, None]
-        ).flatten(1)
+        windows = self._rest_in_window(rows, self._whole(rows)).view(len(rows), *fade.shape, 3)
+        return (windows * fade[:, :, None]).flatten(1)
 
     def _coefficients(self, rows: np.ndarray) -> Tensor:
         whole = self._whole(rows)
@@ -198,17 +192,12 @@ class SurfaceCodec:
 
 def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:
     """Return values(rows), (n, ...), for rows (n,), computed in parts into one array: separate ones fragment memory."""
-    parts = _parts(len(rows))
-    first = values(rows[parts[0]])
+    first = values(rows[:ROWS])
     found = first.new_empty(len(rows), *first.shape[1:])
-    found[parts[0]] = first
-    for part in parts[1:]:
-        found[part] = values(rows[part])
+    found[:ROWS] = first
+    for start in range(ROWS, len(rows), ROWS):
+        found[start : start + ROWS] = values(rows[start : start + ROWS])
     return found
-
-
-def _parts(count: int) -> list[slice]:
-    return [slice(start, min(start + ROWS, count)) for start in range(0, count, ROWS)]
 
 
 def touching(rows: np.ndarray) -> Tensor:

@@ -33,7 +33,7 @@ def unread(monkeypatch):
     monkeypatch.setattr(
         SurfaceCodec, "_at_cells", lambda self, rows, _: cells(self, rows, torch.zeros(len(rows), 2).long())
     )
-    monkeypatch.setattr(SurfaceCodec, "field", lambda self, modes, _: torch.zeros(len(modes), self.nodes, 3))
+    monkeypatch.setattr(SurfaceCodec, "field", lambda self, modes, _: torch.zeros(len(modes), self.data.shape[1], 3))
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)

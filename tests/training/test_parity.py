@@ -114,11 +114,11 @@ def test_mesh_autoencoders(model, nets, contacts, name):
 def test_maps(model, nets):
     biotac, digit = (torch.from_numpy(latent(nets.sizes[net]["latent"])) for net in ("MVB", "MVD"))
     rectified = np.arange(len(latent(16))) % 3 == 0
-    signed, folded = (net(torch.from_numpy(latent(16))) for net in (model.S2MPN, model.R2MPN))
+    z = torch.from_numpy(latent(16))
+    signed, folded = (net.given(z, net.contact(z)) for net in (model.S2MPN, model.R2MPN))
     same(nets.likely_latents(latent(16))[0], signed)
-    same(
-        nets.likely_latents(latent(16), rectified)[0], torch.where(torch.from_numpy(rectified)[:, None], folded, signed)
-    )
+    either = torch.where(torch.from_numpy(rectified)[:, None], folded, signed)
+    same(nets.likely_latents(latent(16), rectified)[0], either)
     same(nets.m2m(biotac.numpy()), model.across(biotac))
     state = latent(4)[:40]
     both = torch.from_numpy(state), biotac[:40]
