@@ -27,7 +27,7 @@ from benchmarks.measured_rows import finished, parser_of, printed
 from tactile_core import recordings
 from tactile_core.accuracy import Row, row
 from tactile_core.files import threads
-from tactile_core.recordings import Truth, write_simulated
+from tactile_core.recordings import write_simulated
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
@@ -175,12 +175,10 @@ def verbs(folder: Path) -> list[Row]:
 def write_long(path: Path) -> None:
     """Write a recording of LONG frames to ``path``: the shipped one, again and again."""
     one = recordings.read(RECORDING)
-    rows = np.arange(LONG) % len(one)
-    held = {name: getattr(one.truth, name) for name in Truth.__dataclass_fields__}
-    truth = Truth(**{name: values[rows] for name, values in held.items() if isinstance(values, np.ndarray)})
-    counts = {name: getattr(one, name)[rows] for name in ("electrodes", "pdc", "tac", "tdc")}
+    long = one.at(np.arange(LONG) % len(one))
+    counts = {name: getattr(long, name) for name in ("electrodes", "pdc", "tac", "tdc")}
     about = {"scene": "", "seed": 0, "made_by": "profile_verbs", "note": "the shipped recording, repeated"}
-    write_simulated(path, time=np.arange(LONG) / 100, **counts, truth=truth, **about)
+    write_simulated(path, time=np.arange(LONG) / 100, **counts, truth=long.truth, **about)
 
 
 def long_conversion(folder: Path) -> list[Row]:

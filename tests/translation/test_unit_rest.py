@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from benchmarks.translation.grips import in_box
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
@@ -180,15 +181,10 @@ def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
             for name, order in (("as read", slice(None)), ("shuffled", shuffled)):
                 turned = {"change": some.change[:, order], "rest": signals.rest[order]}
                 part = dataclasses.replace(some, **turned)
-                centres[name].append(np.nanmedian(1e3 * translator(part).contact_center, axis=0))
-    within = {name: in_box(np.array(places)).mean() for name, places in centres.items()}
+                centres[name].append(np.nanmedian(translator(part).contact_center, axis=0))
+    within = {name: np.mean([in_box(place) for place in places]) for name, places in centres.items()}
     # Measured: 11 of 12; the one beside lies at z 3.5 mm.
     assert within["as read"] >= 0.9 and within["shuffled"] <= 0.2
-
-
-def in_box(places: np.ndarray) -> np.ndarray:
-    """Whether places (n, 2) mm = (x, z) lie over the squeezed electrodes E7-E10 and E17, x -18.7 to -15.3, and 1.5."""
-    return (places[:, 0] >= -20.2) & (places[:, 0] <= -13.8) & (np.abs(places[:, 1]) <= 3)
 
 
 def test_a_quiet_part_under_the_pressure_of_rest_is_kept_however_far_it_drifted():

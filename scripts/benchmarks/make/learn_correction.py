@@ -55,10 +55,6 @@ class Known(NamedTuple):
     fold: np.ndarray
     rubbing: np.ndarray
 
-    def select_rows(self, which: np.ndarray) -> Known:
-        """Return some of the samples; which : (n,) bool, or their indices"""
-        return Known(*(values[which] for values in self))
-
 
 def mirrored(field: np.ndarray) -> np.ndarray:
     """Mirror ``field`` (..., LINES * LINES, 3), vectors on a flattened grid (along x, along z), at z = 0."""
@@ -264,7 +260,7 @@ def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
     0 for samples of the other kind. kind : true for those with friction"""
     log_factor, fields = np.zeros(len(known.x)), np.zeros_like(known.fields)
     for f in range(_FOLDS):
-        rest = known.select_rows(known.fold != f)
+        rest = Known(*(values[known.fold != f] for values in known))
         part = fit(rest, *choices(rest, kind))
         for i in np.flatnonzero((known.fold == f) & (known.rubbing == kind)):
             log_factor[i], fields[i] = part.log_factor(known.x[i]), part.field(known.x[i])

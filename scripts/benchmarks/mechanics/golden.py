@@ -145,13 +145,11 @@ def in_space() -> Iterator[Row]:
         ball = Sphere(GOLDEN_BALL)
         pose = pose_on(ball, np.array([0, -GOLDEN_THICKNESS, 0]), np.array([0, -1.0, 0]))
         near = np.hypot(*mesh.nodes[mesh.surface][:, [0, 2]].T) < side
-        contact = FiniteStrainContact(
-            FiniteStrainSolid(mesh, MATERIAL), mesh.surface[near], ball, pose, fixed=fixed
-        )  # fmt: skip
+        contact = FiniteStrainContact(FiniteStrainSolid(mesh, MATERIAL), mesh.surface[near], ball, pose, fixed=fixed)
         touch, of = None, f"quarter disc in space, nodes {1e3 * side / inside:.1f} mm apart"
         for depth in depths:
             started = time.perf_counter()
-            touch = contact.press(depth, touch, step=0.2e-3)
+            touch = contact.press(depth, touch, _STEP)
             error = 100 * (4 * touch.force[1] / GOLDEN_FORCE[depth] - 1)
             name = f"golden_quarter_{depth * 1e3:.1f}mm"
             yield row(f"{name}_error", error, "percent", TARGET, baseline=-100.0, of=of)

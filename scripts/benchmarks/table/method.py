@@ -49,12 +49,12 @@ class Method:
         return [*found, row(f"{name}_error", self.error, self.unit, baseline=self.baseline, of=self.of), *self.more]
 
 
-def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:
+def best_ms(work: Callable[[], object], frames: int = 1, most: int = 50) -> float:
     """Return the least CPU ms per frame over repeated calls of ``work``, after a first that may compile. frames :
-    number in a call. Calls are repeated for ``least_seconds`` of CPU, at least 3 and at most ``most`` times."""
+    number in a call. Calls are repeated for 0.5 s of CPU, at least 3 and at most ``most`` times."""
     work()
     took, began = [], time.process_time()
-    while len(took) < 3 or (time.process_time() - began < least_seconds and len(took) < most):
+    while len(took) < 3 or (time.process_time() - began < 0.5 and len(took) < most):
         start = time.process_time()
         work()
         took.append(time.process_time() - start)

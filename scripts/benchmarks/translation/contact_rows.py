@@ -49,12 +49,11 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
             )
             unit, at_least = metric.rsplit("_", 1)[-1].replace("percent", "%").replace("iou", "1"), metric == "iou"
             of = f"{inside.sum()} contacts {name}; baseline: the nearest example"
-            found.append(
-                row(f"likely_{metric}", likely, unit, targets.get(metric), baseline=baseline, of=of, at_least=at_least)
-            )
-            found.append(row(f"mean_{metric}", mean, unit, baseline=baseline, of=of))
+            beside = {"baseline": baseline, "of": of}
+            found.append(row(f"likely_{metric}", likely, unit, targets.get(metric), at_least=at_least, **beside))
+            found.append(row(f"mean_{metric}", mean, unit, **beside))
             if metric != "force_size_percent":  # which solving takes as it is
-                found.append(row(f"solved_{metric}", solved, unit, baseline=baseline, of=of))
+                found.append(row(f"solved_{metric}", solved, unit, **beside))
     return found
 
 
@@ -65,7 +64,7 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
     change : (C, 19) counts, the pairs' signals as read, before they lose their sign"""
     folded, unsigned = recovered(np.abs(change), np.ones(len(change), bool))
     read = nets.encode_signal(folded, unsigned)
-    state = nets.posterior(read, unsigned).likely
+    state = nets.contact(read, unsigned)
     gel = nets.decode_target(nets.latents(read, state, unsigned)[1])
     still = ~pairs.slide.any(-1)
     deep, truth = (
@@ -121,9 +120,8 @@ def _answers(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -
     """Return ``metrics`` of the likely, mean and solved answer to ``change`` (C, 19) counts."""
     read = nets.encode_signal(change)
     posterior = nets.posterior(read)
-    mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
     found = {}
-    for name, state in (("likely", posterior.likely), ("mean", mean)):
+    for name, state in (("likely", posterior.likely), ("mean", posterior.average)):
         skin, latent = nets.latents(read, state)
         gel, force = nets.decode_target(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
         found |= metrics(name, gel, force, pairs, bodies)

@@ -33,10 +33,10 @@ Truth = dict[str, np.ndarray]
 Errors = dict[str, np.ndarray]  # by UNITS, a number per judged frame
 
 
-def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
+def rows(network: Translator, every: int = 1) -> list[Row]:
     """Return rows of median errors over frames above 0.1 N: of all sequences, of each motion, and with a wrong rest.
-    file : the test set; every : take one sequence in ``every``"""
-    truth = {name: values[::every] for name, values in read(file).items()}
+    every : take one sequence in ``every``"""
+    truth = {name: values[::every] for name, values in read().items()}
     kind = np.repeat(truth["motion"], (truth["force"] > TOUCHED).sum(axis=1))
     number, everything = len(truth["motion"]), slice(None)
     whole = f"{len(kind)} frames of {number} sequences; baseline: each frame alone"
@@ -68,9 +68,9 @@ def measured(network: Translator, truth: Truth, rest_off: float) -> tuple[Errors
     return joined(iter(followed)), joined(iter(alone))
 
 
-def read(file: Path = FILE) -> Truth:
+def read() -> Truth:
     """Read the test set by name, (S, 40, ...): signal counts, force N, center m, peak m, patch bits; motion (S,)."""
-    with np.load(file, allow_pickle=False) as found:
+    with np.load(FILE, allow_pickle=False) as found:
         return {name: found[name] for name in found.files}
 
 

@@ -23,7 +23,7 @@ from tactile_core.translation.translator import Translation
 
 WRENCH_RATE = 150.0  # Hz, nominal; its even grid sets where a recording begins and ends
 CUT = 5.0  # Hz
-HALF_MEDIAN, GLITCH = 5, 30.0  # samples to each side, counts
+MEDIAN, GLITCH = 11, 30.0  # samples, counts
 FEWEST = 100  # frames; a second, less than the filter's own length says nothing (assumed)
 DEGREE = 3  # of the polynomial in the arm's place that is removed
 CHOOSING = 7  # the sample of each material that may be looked at to choose settings and weights by
@@ -121,9 +121,10 @@ def _table(path: Path, columns: int) -> np.ndarray:
 
 def replace_glitches(electrodes: np.ndarray) -> np.ndarray:
     """Replace samples of electrodes (T, 19) counts that are over 30 counts from the median of 11, by interpolation."""
-    padded = np.pad(electrodes, ((HALF_MEDIAN, HALF_MEDIAN), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_MEDIAN + 1, axis=0)
-    return fill(electrodes, np.abs(electrodes - np.median(windows, axis=-1)) > GLITCH)
+    from scipy.ndimage import median_filter
+
+    usual = median_filter(electrodes, (MEDIAN, 1), mode="nearest")
+    return fill(electrodes, np.abs(electrodes - usual) > GLITCH)
 
 
 def lowpass(values: np.ndarray) -> np.ndarray:
