@@ -163,6 +163,7 @@ def test_links_lead_nowhere_else_and_a_missing_file_is_named(ball):
         ("z_mm = 0.5", "z_mm = -0.5", "z_mm"),
         ("z_mm = 0.5", "z_mm = inf", "infinite"),
         ("turn_deg = 90", "tilt_deg = 90", "tilt_deg"),
+        ("x_mm = -3", "x_mm = -3, z_mm = 0.7", r"lowest reaches z = 0\.5 mm"),
         ('kind = "sphere"', 'kind = "several"', "several"),
     ],
 )
@@ -170,9 +171,4 @@ def test_bad_sizes_and_groups_are_refused(tmp_path, old, new, said):
     text = next(text for text in (HEAD + SEVERAL, TRAINING.read_text(encoding="utf-8")) if old in text)
     (tmp_path / "scene.toml").write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(TactileError, match=said):
-        load_scene(tmp_path)
-
-
-def test_a_group_that_hangs_in_the_air_is_refused(tmp_path):
-    with pytest.raises(TactileError, match=r"lowest reaches z = 0\.5 mm"):
-        build(tmp_path, SEVERAL.replace("x_mm = -3", "x_mm = -3, z_mm = 0.7"))
+        [spec.build() for spec in load_scene(tmp_path)[0].indenters]
