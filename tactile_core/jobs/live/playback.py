@@ -47,14 +47,15 @@ class Growing:
             raise TactileError(path, "there is no such file", "a CSV recording that is being written")
         self._file = self._path.stat()
 
-    def poll(self) -> Recording | None:
+    def poll(self, *, last: bool = False) -> Recording | None:
         """Return the rows since the last call, at first some together; None if there are none, or too many are bad.
+        last : true if no more will come, so that the first are not waited for
 
         Raises TactileError for a file that became shorter, was written anew or is another one, for one that is no
         recording, for a row of another sensor, and if over a fifth of all rows is bad. A bad cell among good
         rows is NaN."""
         data = self._new_bytes()
-        if not data:
+        if not (data or last):
             return None
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
         if len(self._rest) > MAX_LINE:
@@ -70,7 +71,7 @@ class Growing:
         table = read_lines(str(self._path), self._header, whole + end, self._lines)
         if table is not None:
             read = table_reader(str(self._path), table.header, self._columns, self._sensor, self._finger)
-            if not self.rows and len(table.lines) < FEW:
+            if not (self.rows or last) and len(table.lines) < FEW:
                 self._rest = whole + end + self._rest
                 return None
         self._lines += whole.count(b"\n") + 1
@@ -164,6 +165,8 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
         else:
             last = came
         yield rows, came
+    if (rows := growing.poll(last=True)) is not None:
+        yield rows, time.perf_counter()
 
 
 def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:

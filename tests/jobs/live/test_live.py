@@ -120,6 +120,13 @@ def test_what_is_played_comes_at_its_own_rate(slide_csv, tmp_path):
     assert main([*words, "--tare", "1200:1500", "--rate", "100"]) == 2
 
 
+def test_a_few_rows_are_shown_once_no_more_come(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(playback, "time", Clock())
+    words = ["watch", str(slide_csv(frames=20)), "--idle", "0.2", "--tare", "0:10", "--out", str(tmp_path / "now.png")]
+    assert main(words) == 0 and capsys.readouterr().out.startswith("20 frames: ")
+    assert (tmp_path / "now.png").exists()
+
+
 def test_a_growing_file_s_first_stamps_tell_its_rate(slide_csv):
     path = slide_csv(frames=90)
     head, *lines = path.read_text().splitlines(keepends=True)
