@@ -29,11 +29,12 @@ LAST = 256  # bytes by which a file is known that grew
 # Rows, 0.3 s, that come together at first, so that their stamps tell the rate, and of which any number may be bad at
 # once: a program that stumbles, or a cable that is touched.
 FEW = 30
+PATIENCE = 5.0  # s after which fewer of them are shown as well
 
 
 class Growing:
     """A CSV recording that another program is writing, in any of the text layouts.
-    rows, bad : number of rows read so far, and of bad ones among them"""
+    rows, bad, held : number of rows read so far, of bad ones among them, and of first ones that wait for more"""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
         """Follow a CSV file, or finger 1 of it by ``path#1``. columns : map of its columns; sensor : name of its sensor
@@ -42,14 +43,14 @@ class Growing:
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines, self._last = 0, b"", 0, b""
         self._header: Header | None = None
-        self.rows, self.bad = 0, 0  # that came; of them passed over
+        self.rows, self.bad, self.held = 0, 0, 0
         if not self._path.is_file():
             raise TactileError(path, "there is no such file", "a CSV recording that is being written")
         self._file = self._path.stat()
 
     def poll(self, *, last: bool = False) -> Recording | None:
         """Return the rows since the last call, at first some together; None if there are none, or too many are bad.
-        last : true if no more will come, so that the first are not waited for
+        last : true if the first rows are not waited for any longer, as if no more come
 
         Raises TactileError for a file that became shorter, was written anew or is another one, for one that is no
         recording, for a row of another sensor, and if over a fifth of all rows is bad. A bad cell among good
@@ -71,7 +72,8 @@ class Growing:
         table = read_lines(str(self._path), self._header, whole + end, self._lines)
         if table is not None:
             read = table_reader(str(self._path), table.header, self._columns, self._sensor, self._finger)
-            if not (self.rows or last) and len(table.lines) < FEW:
+            self.held = 0 if self.rows or last or len(table.lines) >= FEW else len(table.lines)
+            if self.held:
                 self._rest = whole + end + self._rest
                 return None
         self._lines += whole.count(b"\n") + 1
@@ -153,17 +155,21 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
     """Yield new rows of a growing file and their arrival time, s of time.perf_counter; None and the time if none came.
     idle : s without a row after which it ends, None for never; say : called with a line on bad rows
     columns : map of the columns; sensor : name of the sensor. Raises TactileError as `Growing.poll` does."""
-    growing, last, bad = Growing(path, columns, sensor), time.perf_counter(), 0
+    growing, bad, held = Growing(path, columns, sensor), 0, 0
+    last = began = time.perf_counter()  # when a row came; when the first did that is held
     while idle is None or time.perf_counter() - last < idle:
         came = time.perf_counter()
-        rows = growing.poll()
+        rows = growing.poll(last=came - began > PATIENCE)
         if growing.bad > bad:
             bad = growing.bad
             say(f"{bad} of {growing.rows} rows were bad and are passed over")
-        if rows is None:
+        if not growing.held:
+            began = came
+        if rows is None and growing.held == held:
             time.sleep(POLL)
         else:
             last = came
+        held = growing.held
         yield rows, came
     if (rows := growing.poll(last=True)) is not None:
         yield rows, time.perf_counter()

@@ -121,10 +121,28 @@ def test_what_is_played_comes_at_its_own_rate(slide_csv, tmp_path):
 
 
 def test_a_few_rows_are_shown_once_no_more_come(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(playback, "time", Clock())
+    monkeypatch.setattr(playback, "time", clock := Clock())
     words = ["watch", str(slide_csv(frames=20)), "--idle", "0.2", "--tare", "0:10", "--out", str(tmp_path / "now.png")]
     assert main(words) == 0 and capsys.readouterr().out.startswith("20 frames: ")
     assert (tmp_path / "now.png").exists()
+    clock.slept = 0.0
+    came = [(len(rows), clock.slept) for rows, _ in playback.followed(words[1], 6.0, print) if rows is not None]
+    assert came == [(20, pytest.approx(playback.PATIENCE, abs=0.01))]
+
+
+def test_slow_rows_that_are_held_do_not_count_as_idle(slide_csv, monkeypatch):
+    path = slide_csv(frames=40)
+    head, *lines = path.read_text().splitlines(keepends=True)
+    path.write_text(head)
+    monkeypatch.setattr(playback, "time", clock := Clock())
+    found, due = [], 8.0  # s, of the first row: long after the header
+    for rows, _ in playback.followed(str(path), 1.0 + due, print):
+        found += [] if rows is None else [len(rows)]
+        if lines and clock.slept >= due:
+            with open(path, "a") as file:
+                file.write(lines.pop(0))
+            due += 0.5
+    assert sum(found) == 40 and 9 <= found[0] <= 11 and set(found[1:]) == {1}
 
 
 def test_a_growing_file_s_first_stamps_tell_its_rate(slide_csv):
