@@ -24,12 +24,12 @@ from .indenter import Indenter, lengths
 from .spline_grid import SplineGrid, TipGrid
 
 log = logging.getLogger(__name__)
-_FORMAT = 6  # raise when the meaning of the cached arrays changes
+_FORMAT = 5  # raise when the meaning of the cached arrays changes
 _ROOM = "40 MB"
-_ARRAYS = ("coefficients", "origin", "vertices", "error", "stem", "stem_place")  # the last two are empty for one grid
+_ARRAYS = ("coefficients", "origin", "hull", "error", "stem", "stem_place")  # the last two are empty for one grid
 _SPACING = (0.01e-3, 1e-3)  # m
 _FLATTEST = 0.5  # least slope that a curvature is divided by: the spline is flatter only deep inside, between faces
-_LEVEL = 1e-7  # m, vertices this near to the farthest one lie equally far
+_LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
 
 
 def as_indenter(body: Any) -> Indenter:
@@ -47,12 +47,12 @@ class MeshIndenter(Summary, Indenter):
     Its surface is where a tricubic spline of the mesh's signed distance is zero: smooth, with sharp edges rounded over
     about one grid spacing. Normals and curvatures are exactly those of the spline's level surfaces.
 
-    grid : the spline, m, fine where the body may touch; vertices : (k, 3) m, the mesh's own
+    grid : the spline, m, fine where the body may touch; hull : (k, 3) m, vertices of the mesh's convex hull
     error : rms and largest difference, m, between ``distance`` and the mesh's, at 500 random places within 0.3 mm of it
     """
 
     grid: SplineGrid | TipGrid
-    vertices: np.ndarray
+    hull: np.ndarray
     error: tuple[float, float]
 
     @classmethod
@@ -114,18 +114,18 @@ class MeshIndenter(Summary, Indenter):
             log.info("building the distance grid of %s in %s (once)", where, folder)
             mesh = make()
             grid, near = mesh_grid.build(mesh, where, spacing)
-            built = cls(grid, mesh.vertices * 1e-3, (0.0, 0.0))
+            built = cls(grid, _hull(mesh), (0.0, 0.0))
             error = mesh_grid.error_of(mesh, near, built.distance, getattr(grid, "top", np.inf))
             log.info("%s: distance within %.1f um rms, %.1f um at most", where, *(error * 1e6))
             array_cache.claim(folder, _ROOM)
             array_cache.store(folder, _arrays_of(built, error).items(), _ROOM)
             arrays = _load(folder)
-        coefficients, origin, vertices, error, stem, stem_place = arrays
+        coefficients, origin, hull, error, stem, stem_place = arrays
         fine, rms_and_largest = SplineGrid(origin, spacing, coefficients), (float(error[0]), float(error[1]))
         if not len(stem):
-            return cls(fine, vertices, rms_and_largest)
+            return cls(fine, hull, rms_and_largest)
         coarse = SplineGrid(stem_place[:3], float(stem_place[3]), stem)
-        return cls(TipGrid(fine, coarse, float(stem_place[4])), vertices, rms_and_largest)
+        return cls(TipGrid(fine, coarse, float(stem_place[4])), hull, rms_and_largest)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the spline's value (n,) m and its level surface's unit normal (n, 3); see ``Indenter.distance``.
@@ -144,8 +144,8 @@ class MeshIndenter(Summary, Indenter):
 
     def support(self, direction: np.ndarray) -> np.ndarray:
         """Return the mesh's own farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
-        reach = self.vertices @ direction
-        return self.vertices[reach > reach.max() - _LEVEL].mean(axis=0)
+        reach = self.hull @ direction
+        return self.hull[reach > reach.max() - _LEVEL].mean(axis=0)
 
 
 def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
@@ -156,7 +156,7 @@ def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
     if isinstance(grid, TipGrid):
         coarse = grid.coarse
         stem, place = coarse.coefficients, np.array([*coarse.origin, coarse.spacing, grid.top])
-    return dict(zip(_ARRAYS, (fine.coefficients, fine.origin, built.vertices, error, stem, place), strict=True))
+    return dict(zip(_ARRAYS, (fine.coefficients, fine.origin, built.hull, error, stem, place), strict=True))
 
 
 def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -176,6 +176,13 @@ def _check(path: str | os.PathLike, scale: float, up: str, spacing: float) -> No
         raise TactileError(path, f"up = {up!r}", f"one of {', '.join(mesh_file.UPS)}")
     if not _SPACING[0] <= spacing <= _SPACING[1]:
         raise TactileError(path, f"spacing_mm = {spacing * 1e3:g}", "0.01 to 1 mm")
+
+
+def _hull(mesh: Any) -> np.ndarray:
+    """Return the vertices (k, 3) m of the convex hull of a mesh in mm."""
+    import scipy.spatial
+
+    return mesh.vertices[scipy.spatial.ConvexHull(mesh.vertices).vertices] * 1e-3
 
 
 @functools.lru_cache(maxsize=4)  # a scene asks for its indenters at every press
