@@ -26,6 +26,7 @@ MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 
 # Of correlations with a unit's own picture, which other DIGITs' have by .79 to .98, and by .49 to .67 with red and blue
 # exchanged (assumed)
 MORE_ALIKE = 0.15
+ALIKE = 0.5  # least correlation that tells a way at all (assumed: two units .2, the right way of one .98)
 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
@@ -44,6 +45,7 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     leds, albedo = unit.photographed
     coating = dataclasses.replace(unit.coating, albedo=albedo)
     now, then = _open_light(unit), _open_light(dataclasses.replace(unit, leds=leds, coating=coating))
+    check_way(photograph, then, unit.photograph)
     return photograph * np.maximum(now, 0) / np.maximum(then, DARK)
 
 
@@ -107,7 +109,7 @@ def check_way(picture: np.ndarray, own: np.ndarray, where: str = "background") -
     ways |= {"picture[::-1]": picture[::-1], "picture[:, ::-1]": picture[:, ::-1]}
     alike = {way: _correlation(each, own) for way, each in ways.items()}
     best = max(alike, key=alike.__getitem__)
-    if alike[best] > alike["as it is"] + MORE_ALIKE:
+    if alike[best] > max(ALIKE, alike["as it is"] + MORE_ALIKE):
         found = f"like the calibration's ({alike['as it is']:.2f} as it is, {alike[best]:.2f} {best})"
         raise TactileError(where, found, "red, green, blue, fingertip up", f"Give {best}, or calibrate the unit")
 

@@ -326,11 +326,11 @@ def test_llvm_that_is_missing_is_named_with_what_to_do(render, heights, monkeypa
 
 
 def test_a_scene_file_takes_no_other_file_s_place(render, heights, tmp_path):
-    for name in ("gel.xml", "gel.ply", "gel.camera.exr"):
-        (tmp_path / name).write_text("mine")
+    for name, mine in (("gel.xml", "<xml/>"), ("gel.ply", "plywood"), ("gel.camera.exr", "v/1")):
+        (tmp_path / name).write_text(mine)
         status, _, err = render(heights, "--scene-out", tmp_path / "gel.xml")
         assert status == 2 and f"{name}: exists already (a file)" in err and "--overwrite" in err
         status, _, err = render(heights, "--scene-out", tmp_path / "gel.xml", "--overwrite")
         assert status == 2 and f"{name}: a file that is no scene's" in err
-        assert not (tmp_path / "out").exists() and (tmp_path / name).read_text() == "mine"
+        assert not (tmp_path / "out").exists() and (tmp_path / name).read_text() == mine
         (tmp_path / name).unlink()

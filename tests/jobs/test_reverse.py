@@ -29,6 +29,8 @@ def test_a_gel_gives_back_the_skin_the_force_and_the_counts(shipped, tmp_path):
     before = out.read_bytes()
     assert main(words) == 2 and out.read_bytes() == before
     assert main([*words, "--overwrite"]) == 0 and out.read_bytes() == before
+    out.write_bytes(b"")  # as mktemp makes it
+    assert main([*words, "--overwrite"]) == 0 and out.read_bytes() == before
     own, notes = tmp_path / "own.h5", tmp_path / "notes.txt"
     shutil.copy(SHIPPED, own)
     notes.write_text("mine")

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from tactile_core.errors import TactileError
-from tactile_core.pictures.background import read_photograph, resting_picture
+from tactile_core.pictures.background import check_way, read_photograph, resting_picture
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
@@ -43,8 +43,15 @@ def test_lights_that_are_off_or_doubled_act_on_a_photograph(unit):
 @pytest.mark.parametrize("way", [np.s_[::-1], np.s_[:, ::-1], np.s_[..., ::-1]])
 def test_a_photograph_that_is_turned_mirrored_or_blue_first_is_refused(unit, way):
     Image.fromarray(read_photograph(unit.photograph)[way].copy()).save(unit.photograph)
-    with pytest.raises(TactileError, match=r"as it is, \d\.\d\d picture"):
-        at_rest(unit)
+    for changed in ({}, {"radiance": lambda led: 1.02 * led.radiance}):
+        with pytest.raises(TactileError, match=rf"{re.escape(unit.photograph)}.*as it is, \d\.\d\d picture"):
+            at_rest(unit, **changed)
+
+
+def test_another_unit_s_photograph_is_not_taken_for_a_turned_one(unit):
+    own = at_rest(unit)
+    noise = np.random.default_rng(0).normal(scale=6 * own.std(), size=own.shape)
+    check_way((own[:, ::-1] + noise).astype(np.float32), own)  # a fifth alike, mirrored; less as it is
 
 
 def test_a_moved_light_and_another_albedo_act_on_a_photograph(unit):

@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
     if playing:
         source = live.played(path, speed, say, columns, sensor)
     else:
-        source = live.followed(path, options.idle, say, columns, sensor)
+        source = live.followed(path, options.idle, say, columns, sensor, wait=options.rate is None)
     prepare = PrepareOptions(tare=None if options.tare == "auto" else options.tare, polarity=options.polarity)
     unit = None
     if options.sensor is not None:

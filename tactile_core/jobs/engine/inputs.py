@@ -110,7 +110,7 @@ def _of_folder(folder: Path) -> Iterator[Path]:
     if _is_bag(folder):
         yield folder
         return
-    for place, folders, names in walked(folder):
+    for place, folders, names in walked(folder, bags=True):
         bags = [name for name in folders if _is_bag(Path(place, name))]
         folders[:] = sorted(name for name in folders if name not in bags)
         beside = BESIDE if any(name.endswith(SLIDE) for name in names) else ()
@@ -122,12 +122,13 @@ def _of_folder(folder: Path) -> Iterator[Path]:
                 log.warning("%s: a link that leads nowhere, passed over", os.path.join(place, name))
 
 
-def walked(folder: Path) -> Iterator[tuple[str, list[str], list[str]]]:
-    """Yield what `os.walk` does, without hidden folders and files; linked and unreadable folders are logged."""
+def walked(folder: Path, *, bags: bool = False) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield what `os.walk` does, without hidden folders and files; linked and unreadable folders are logged.
+    bags : true if the caller takes linked ROS 2 bags itself"""
     for place, folders, names in os.walk(folder, onerror=_passed_over):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for path in (os.path.join(place, name) for name in folders):
-            if os.path.islink(path) and not _is_bag(Path(path)):
+            if os.path.islink(path) and not (bags and _is_bag(Path(path))):
                 log.warning("%s: a linked folder, passed over; copy it, or name it apart", path)
         yield place, folders, [name for name in names if not name.startswith(".")]
 

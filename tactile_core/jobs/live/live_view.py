@@ -85,7 +85,7 @@ class LiveSignals:
     def learn(self, rows: Recording) -> bool:
         """Search new frames, rows, for rest and polarity; return true once rest is known."""
         if not self.rate:
-            self._begin(min(max(rows.rate, LEAST_RATE), MOST_RATE))
+            self._begin(_stamped_rate(rows))
         self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
         self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
         if self._known is None or not self.sure:
@@ -162,6 +162,13 @@ class LiveSignals:
         from ...recordings import electrode_gains
 
         return electrode_gains.apply(signals, self._unit)
+
+
+def _stamped_rate(rows: Recording) -> float:
+    """Return the rate, Hz, that the stamps of the first rows tell; 100 Hz if they come in bursts."""
+    steps = len(rows.time) - 1
+    even = not steps or 0.5 < steps / max(rows.duration * rows.rate, 1e-9) < 2
+    return min(max(rows.rate, LEAST_RATE), MOST_RATE) if even else SAMPLE_RATE
 
 
 def _source(signals: Signals) -> str:

@@ -110,6 +110,7 @@ class Growing:
 
 
 POLL = 0.002  # s between two looks at the file
+SET_BACK = 1.0  # s by which a stamp lies before the last if the clock was set, not read late (assumed)
 LONGEST_WAIT = 10.0  # s without a frame that are played; a longer gap is skipped
 REPORT_EVERY = 1.0  # s between two lines of numbers
 
@@ -151,15 +152,19 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
             tell(f"{view.frames} frames: {view.describe_latency()}")
 
 
-def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
+def followed(
+    path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE,
+    *, wait: bool = True,
+) -> Rows:  # fmt: skip
     """Yield new rows of a growing file and their arrival time, s of time.perf_counter; None and the time if none came.
     idle : s without a row after which it ends, None for never; say : called with a line on bad rows
-    columns : map of the columns; sensor : name of the sensor. Raises TactileError as `Growing.poll` does."""
+    columns : map of the columns; sensor : name of the sensor; wait : true if the first rows wait for 30 of them
+    Raises TactileError as `Growing.poll` does."""
     growing, bad, held = Growing(path, columns, sensor), 0, 0
     last = began = time.perf_counter()  # when a row came; when the first did that is held
     while idle is None or time.perf_counter() - last < idle:
         came = time.perf_counter()
-        rows = growing.poll(last=came - began > PATIENCE)
+        rows = growing.poll(last=not wait or came - began > PATIENCE)
         if growing.bad > bad:
             bad = growing.bad
             say(f"{bad} of {growing.rows} rows were bad and are passed over")
@@ -185,7 +190,8 @@ def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, 
             found, advice = "snapshots, which do not follow each other", "Translate them: convert --frames-apart"
             raise TactileError(path, found, "frames in order", advice)
         steps = np.diff(recording.time, prepend=recording.time[:1])
-        due_at = np.cumsum(np.where(steps >= 0, steps, 1 / recording.rate))  # s; a clock that is set back goes on here
+        set_back = np.cumsum(np.where(steps < -SET_BACK, 1 / recording.rate - steps, 0.0))  # such a clock goes on here
+        due_at = np.sort(recording.time + set_back)  # stamps that were read late: the rows come evenly all the same
         due_at += last - due_at[max(done - 1, 0)]
         last = due_at[-1]
         for warning in recording.warnings if not done else ():

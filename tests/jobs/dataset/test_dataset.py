@@ -287,13 +287,16 @@ def test_a_rest_beside_each_session_is_no_rest_of_all(folder, recipe, tmp_path, 
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need rights there")
-def test_links_to_one_file_keep_labels_of_their_own(folder, recipe, tmp_path):
+def test_links_to_one_file_keep_labels_of_their_own(folder, recipe, tmp_path, caplog):
     own = small(folder, recipe, tmp_path)
+    (own[1] / "linked").symlink_to(own[1])
+    (own[1] / ".ball_9.npz").touch()
     (own[1] / "rolled_4.npz").unlink()
     (own[1] / "rolled_4.npz").symlink_to(own[1] / "ball_0.npz")
     (own[1] / "gone_1.npz").symlink_to(own[1] / "nowhere")
     (own[1] / "loop_1.npz").symlink_to(own[1] / "loop_1.npz")
     assert run(*own) == 2  # two files are not there
+    assert "linked: a linked folder, passed over" in caplog.text and ".ball_9" not in caplog.text
     held = {row["object"]: split for split in ("train", "test") for row in metadata(own[2] / "imagefolder" / split)}
     assert held == {"ball": "train", "rolled": "test"}
 

@@ -14,7 +14,7 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, live
 from tactile_core.jobs.live import playback
-from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
+from tactile_core.recordings import PrepareOptions, chunks, electrode_gains, polarity
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
 from tactile_core.recordings.flags import Flag
@@ -145,31 +145,51 @@ def test_slow_rows_that_are_held_do_not_count_as_idle(slide_csv, monkeypatch):
     assert sum(found) == 40 and 9 <= found[0] <= 11 and set(found[1:]) == {1}
 
 
-def test_a_growing_file_s_first_stamps_tell_its_rate(slide_csv):
+@pytest.mark.parametrize(
+    ("stamp", "rate"),
+    [
+        (lambda number: number / 25, 25.0),
+        (lambda number: number // 10 / 10 + number % 10 * 2e-5, 100.0),  # buffered, ten at a time: as without stamps
+        (lambda number: number * 1e-6, 1e4),
+    ],
+)
+def test_a_growing_file_s_first_stamps_tell_its_rate(slide_csv, stamp, rate):
     path = slide_csv(frames=90)
     head, *lines = path.read_text().splitlines(keepends=True)
     path.write_text(head)
     growing, signals, found = live.Growing(path), live.LiveSignals(None), []
     for number, line in enumerate(lines):
         with open(path, "a") as file:
-            file.write(f"{number / 25:.2f},{line.split(',', 1)[1]}")  # 25 Hz
+            file.write(f"{stamp(number):.6f},{line.split(',', 1)[1]}")
         rows = growing.poll()
         if rows is not None:
             signals.learn(rows)
             found.append(len(rows))
-    assert signals.rate == pytest.approx(25.0) and sum(found) == 90 and found[1:] == [1] * (len(found) - 1)
+    assert signals.rate == pytest.approx(rate) and sum(found) == 90 and found[1:] == [1] * (len(found) - 1)
 
 
-@pytest.mark.parametrize(("until", "step"), [(90, -5.0), (60, 3600.0)])
-def test_a_clock_that_is_set_leaves_no_frame_out(slide_csv, tmp_path, monkeypatch, capsys, until, step):
+@pytest.mark.parametrize(
+    ("rows", "step"),
+    [(slice(30, 90), -5.0), (slice(30, 60), 3600.0), (slice(0, 90, 2), 0.015), (slice(0, 90, 2), 0.045)],
+)
+def test_a_clock_that_is_set_or_read_late_leaves_no_frame_out(slide_csv, tmp_path, monkeypatch, capsys, rows, step):
     electrodes = recordings.read(slide_csv(frames=90)).electrodes
     stamps = np.arange(90) / 100
-    stamps[30:until] += step
+    stamps[rows] += step
     np.savez(tmp_path / "set.npz", electrodes=electrodes, time=stamps)
     monkeypatch.setattr(playback, "time", clock := Clock())
     assert main(["watch", str(tmp_path / "set.npz"), "--play", "--out", str(tmp_path / "now.png")]) == 0
     assert ", 0 frames passed over" in capsys.readouterr().out
     assert 0.8 < clock.slept < 1.0
+
+
+def test_parts_of_a_recording_are_played_one_after_the_other(slide_csv, tmp_path, monkeypatch, capsys):
+    path = slide_csv(frames=600)
+    monkeypatch.setattr(chunks, "TEXT_BYTES", path.stat().st_size // 2)
+    assert len(list(chunks.read_parts(path))) > 1
+    monkeypatch.setattr(playback, "time", clock := Clock())
+    assert main(["watch", str(path), "--play", "--out", str(tmp_path / "now.png")]) == 0
+    assert clock.slept == pytest.approx(recordings.read(path).duration, abs=0.05)
 
 
 def test_snapshots_are_not_played(tmp_path, capsys):
