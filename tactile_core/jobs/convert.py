@@ -240,7 +240,7 @@ def note(
 
 def _is_reversed(path: str | os.PathLike) -> bool:
     """Return true if a file is a result of ``reverse``, or empty."""
-    if not os.path.getsize(path):
+    if os.path.isfile(path) and not os.path.getsize(path):
         return True
     try:
         with open_hdf5(os.fspath(path)) as store:

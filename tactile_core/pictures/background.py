@@ -105,13 +105,15 @@ def terms(most: int) -> Iterator[tuple[int, int]]:
 def check_way(picture: np.ndarray, own: np.ndarray, where: str = "background") -> None:
     """Raise TactileError, which names ``where``, for a background that is much more like the unit's own after its
     colours are exchanged or it is turned or mirrored. picture, own : (H, W, 3) levels, it and the unit's own"""
-    ways = {"as it is": picture, "picture[..., ::-1]": picture[..., ::-1], "picture[::-1, ::-1]": picture[::-1, ::-1]}
-    ways |= {"picture[::-1]": picture[::-1], "picture[:, ::-1]": picture[:, ::-1]}
+    ways = {
+        "as it is": picture, "with red and blue exchanged": picture[..., ::-1], "turned by 180°": picture[::-1, ::-1],
+        "mirrored up and down": picture[::-1], "mirrored left and right": picture[:, ::-1],
+    }  # fmt: skip
     alike = {way: _correlation(each, own) for way, each in ways.items()}
     best = max(alike, key=alike.__getitem__)
     if alike[best] > max(ALIKE, alike["as it is"] + MORE_ALIKE):
         found = f"like the calibration's ({alike['as it is']:.2f} as it is, {alike[best]:.2f} {best})"
-        raise TactileError(where, found, "red, green, blue, fingertip up", f"Give {best}, or calibrate the unit")
+        raise TactileError(where, found, "red, green, blue, fingertip up", f"Give it {best}, or calibrate the unit")
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

@@ -137,9 +137,7 @@ class Recording(Summary):
                 found += f" {value.shape} of {value.dtype}, beside electrodes {np.shape(self.electrodes)}"
             plain = isinstance(value, np.ndarray) and not isinstance(value, np.ma.MaskedArray | np.matrix)
             kinds = "iu" if name == "flags" else "iuf"
-            plain = (
-                plain and value.dtype.kind in kinds and value.dtype.itemsize <= 8
-            )  # bytes; numpy's functions refuse more
+            plain = plain and value.dtype.kind in kinds and value.dtype.itemsize <= 8  # bytes; numpy refuses more
             if not plain or value.ndim != axes or len(value) != len(self.electrodes):
                 raise TactileError(f"{self.path}, {name}", found, expected, "Recording.at takes frames out of all")
 

@@ -1,5 +1,6 @@
 """From a gel back to the skin: nearer the truth than an untouched finger, and refused where there is no gel."""
 
+import os
 import shutil
 
 import h5py
@@ -38,6 +39,9 @@ def test_a_gel_gives_back_the_skin_the_force_and_the_counts(shipped, tmp_path):
         held = other.read_bytes()
         assert main(["convert", str(own), "--reverse", "--overwrite", "--out", str(other)]) == 2
         assert other.read_bytes() == held
+    if os.name != "nt":
+        (tmp_path / "link.h5").symlink_to("nowhere")
+        assert main(["convert", str(own), "--reverse", "--overwrite", "--out", str(tmp_path / "link.h5")]) == 2
 
 
 def test_what_is_no_gel_is_refused(slide_csv, tmp_path, capsys):
