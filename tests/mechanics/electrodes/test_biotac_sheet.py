@@ -116,6 +116,7 @@ def test_what_is_kept_is_what_was_made(tmp_path, monkeypatch):
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(module, "_DENTS", 4)
     monkeypatch.setattr(module, "_FIELDS", 9)
+    monkeypatch.setattr(module, "_FINE", 1)
     made = module._cached("biotac", sheet.sheet, sheet.film)
     assert made["fields"].shape == (len(sheet.film) - 1, 23 + 9)
     (kept,) = tmp_path.glob("cache/sheet-biotac-*/fields.npy")
