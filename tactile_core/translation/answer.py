@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import math
 import re
@@ -68,15 +67,6 @@ class Answer:
             return ()
         x, z = self.mount_shift_mm
         return (f"contacts lie {x:g} mm along x and {z:g} mm along z from their place on the DIGIT (--mount-shift)",)
-
-
-def parse_answer(options: argparse.Namespace) -> Answer:
-    """Return the `Answer` that a command line's options give. Raises TactileError for a shift or a number of samples
-    out of range."""
-    if not 0 <= options.samples <= MOST_SAMPLES:
-        raise TactileError("--samples", str(options.samples), f"0 to {MOST_SAMPLES}")
-    shift = (0.0, 0.0) if options.mount_shift is None else parse_shift(options.mount_shift)
-    return Answer(options.answer, options.frames_apart, shift, options.samples, options.contacts)
 
 
 def parse_shift(text: str) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from conftest import ROOT
 
 def can_mount() -> bool:
     """Root in a container may still be forbidden to."""
-    if os.name != "posix" or os.geteuid() != 0 or shutil.which("unshare") is None or shutil.which("ldd") is None:
+    if os.name != "posix" or os.geteuid() != 0 or not all(map(shutil.which, ("unshare", "ldd", "chroot"))):
         return False
     tried = subprocess.run(["unshare", "--mount", "mount", "--bind", "/tmp", "/tmp"], capture_output=True)
     return tried.returncode == 0
@@ -31,7 +31,7 @@ def tree(tmp_path) -> Path:
     return tmp_path / "tree"
 
 
-@pytest.mark.skipif(not can_mount(), reason="needs root that may mount, unshare and ldd")
+@pytest.mark.skipif(not can_mount(), reason="needs root that may mount, unshare, ldd and chroot")
 def test_the_checkout_is_there_for_the_tree_alone(tree):
     binary = runpy.run_path(str(ROOT / "scripts" / "fetch_blender.py"))["wrapper"](tree)
     command = [str(binary), "--inside", "/bin/ls", str(ROOT)]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ..terminal import bar, complain, counted, next_step, say, tell
 from . import engine
-from .common import ANSWER, PREPARE, PRESETS, RESUMES, UNIT, add, prepare_words
+from .common import ANSWER, PREPARE, PRESETS, RESUMES, UNIT, add, parse_answer, prepare_words
 
 if TYPE_CHECKING:
     from ...jobs.engine.job import Job, Translate
@@ -165,7 +165,6 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     from ...jobs import results, translate_shards
     from ...jobs.engine.job import SHARD_FRAMES, Prepare, Translate
     from ...recordings import electrode_gains
-    from ...translation.answer import parse_answer
 
     wanted = Translate(
         keep=list(results.parse_words(options.keep, results.KEEPABLE, least=0)), weights="",

@@ -9,6 +9,7 @@ from ...errors import TactileError
 
 if TYPE_CHECKING:
     from ...recordings.tables.column_map import ColumnMap
+    from ...translation.answer import Answer
 
 # What a stopped verb leaves.
 NOTHING = "no half file is left"
@@ -110,3 +111,14 @@ def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
         "polarity": options.polarity,
         "columns": columns_of(options),
     }
+
+
+def parse_answer(options: argparse.Namespace) -> Answer:
+    """Return the `Answer` that a command line's options give. Raises TactileError for a shift or a number of samples
+    out of range."""
+    from ...translation.answer import MOST_SAMPLES, Answer, parse_shift
+
+    if not 0 <= options.samples <= MOST_SAMPLES:
+        raise TactileError("--samples", str(options.samples), f"0 to {MOST_SAMPLES}")
+    shift = (0.0, 0.0) if options.mount_shift is None else parse_shift(options.mount_shift)
+    return Answer(options.answer, options.frames_apart, shift, options.samples, options.contacts)

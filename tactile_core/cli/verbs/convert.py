@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, complain, next_step, say, tell
-from .common import ANSWER, OPTIONS, PREPARE, UNIT, add, prepare_words
+from .common import ANSWER, OPTIONS, PREPARE, UNIT, add, parse_answer, prepare_words
 
 if TYPE_CHECKING:
     from ...jobs.convert import Options, ToolOptions
@@ -135,7 +135,6 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
     from ...pictures import presets
     from ...pictures.mitsuba import variant
     from ...recordings import PrepareOptions, electrode_gains, readers
-    from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
     keep = results.parse_words(options.keep, results.KEEPABLE, least=0)
