@@ -1,9 +1,10 @@
 """Compile loops by numba, which the extras [fem] and [fast] bring.
 
 A loop is written once, as plain Python over arrays. numba is imported at its first call; compiled code is kept on disk,
-beside the source or in the user's cache, for the next process. Without numba the same lines run uncompiled and give the
-same numbers, but for the last bits of cos, sin and exp: contacts then take five to twenty-five times as long. Short
-calls of a loop that was never compiled on a machine run so, too, for a while: compiling takes as long as hundreds."""
+beside the source or in the user's cache, for the next process; where neither can be written, or it is damaged, each
+process compiles anew. Without numba the same lines run uncompiled and give the same numbers, but for the last bits of
+cos, sin and exp: contacts then take five to twenty-five times as long. Short calls of a loop that was never compiled on
+a machine run so, too, for a while: compiling takes as long as hundreds."""
 
 from __future__ import annotations
 
@@ -59,6 +60,7 @@ class Loop:
         self._waits = waits
         self._function, self._run = function, self._first_call
         self._spent = 0.0  # s, uncompiled
+        self._kept = True  # its compiled code, on disk
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the function, not compiled if numba is missing or switched off, or as long as compiling does not pay."""
@@ -69,6 +71,11 @@ class Loop:
             while first.__cause__ is not None:
                 first = first.__cause__
             raise first from None
+        except Exception:  # of numba's cache: nowhere to write, a full disk, damage; a loop's own comes again
+            if not (self._kept and available()):
+                raise
+            self._kept, self._run = False, self._first_call
+            return self(*arguments)
 
     def _first_call(self, *arguments: Any) -> Any:
         import numba
@@ -78,7 +85,9 @@ class Loop:
         self._function.__qualname__ = f"{__package__}.{self._function.__qualname__}"
         # numpy's rules for a division by zero; no fast-math: the same numbers on every machine of a kind.
         # Without the wrapper for callers in C compiling takes a tenth less.
-        self._compiled = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(self._function)
+        self._compiled = numba.njit(cache=self._kept, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(
+            self._function
+        )
         self._run = self._compile_and_run if self._never_waits() else self._run_or_compile
         return self._run(*arguments)
 
@@ -90,6 +99,8 @@ class Loop:
         rounded_otherwise = not exact or _ROUNDED_OTHERWISE.intersection(self._function.__code__.co_names)
         if rounded_otherwise or not self._waits or SWITCH in os.environ:
             return True
+        if not self._kept:
+            return False
         return any(Path(self._compiled.stats.cache_path).glob(f"*{self._function.__qualname__}-*.nbi"))
 
     def _run_or_compile(self, *arguments: Any) -> Any:

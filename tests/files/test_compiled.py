@@ -74,6 +74,31 @@ def test_few_points_are_not_compiled_for_and_get_the_same_bits(tmp_path, monkeyp
         assert done.stdout == f"{counts} True\n", done.stderr
 
 
+@pytest.mark.parametrize(
+    ("owner", "name", "failure"),
+    [
+        ("CacheImpl", "_locator_classes", None),  # no folder that this user may write
+        ("IndexDataCacheFile", "save", OSError(28, "No space left on device")),
+        ("IndexDataCacheFile", "load", EOFError("Ran out of input")),  # emptied, as by a power cut
+    ],
+)
+def test_loops_are_compiled_where_they_cannot_be_kept(owner, name, failure, tmp_path, monkeypatch, compiled_loops):
+    caching = pytest.importorskip("numba.core.caching")
+
+    def fails(*_):
+        raise failure
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(getattr(caching, owner), name, fails if failure else [])
+    compiled_loops(True)
+
+    @compiled.Loop
+    def doubled(values):
+        return 2 * values.sum()
+
+    assert [doubled(np.ones(30_000)), doubled(np.ones((2, 3)))] == [60_000, 12]
+
+
 def test_a_stop_during_a_compiled_loop_is_itself(tmp_path, monkeypatch, compiled_loops):
     pytest.importorskip("numba")
     if not hasattr(signal, "setitimer"):
