@@ -112,6 +112,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has gone, as in `tactile info … | head`.
         discard_output()
         return 0
+    except OSError as error:
+        if error.errno is None:
+            raise  # of a library, not of the system
+        where, found = error.filename or "a file or connection", error.strerror or str(error)
+        complain(str(TactileError(where, found, advice="Check paths, permissions and the disk's room")))
+        return 2
     return status
 
 

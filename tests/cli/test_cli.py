@@ -127,6 +127,13 @@ def test_info_describes_and_goes_on_after_a_bad_file(tactile, slide_csv, tmp_pat
     assert "absent.csv" in only_line(err)
 
 
+def test_what_the_system_refuses_is_one_line(tactile, slide_csv, tmp_path):
+    table, long = slide_csv(), "n" * 300
+    for arguments in (("info", table, "--columns", table / "map.toml"), ("batch", table, "--out", long)):
+        status, _, said = tactile(*arguments)
+        assert status == 2 and str(table if arguments[0] == "info" else long) in only_line(said)
+
+
 def test_info_may_be_cut_by_its_reader(slide_csv):
     line = f'"{sys.executable}" -m tactile_core info {" ".join([str(slide_csv())] * 40)}'
     done = subprocess.run(
