@@ -71,7 +71,8 @@ def read_displacement(path: str | os.PathLike, gel: str = TARGET) -> Frames:
     """Return the frames of a sensor's surface, `gel`, in ``frames.h5`` or a simulated recording. Raises TactileError
     for other files, and if the displacement was not kept."""
     if not os.path.isfile(path):
-        raise TactileError(path, "there is no such file", EXPECTED)
+        found = "a folder" if os.path.isdir(path) else "there is no such file"
+        raise TactileError(path, found, "frames.h5, or a simulated recording (.h5)")
     with open(path, "rb") as file:  # the project's own files for this have no user block
         if file.read(len(SIGNATURE)) != SIGNATURE:
             raise TactileError(path, "no HDF5 file", EXPECTED, CONVERT)

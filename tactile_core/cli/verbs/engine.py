@@ -45,7 +45,10 @@ def parts_arguments(verb: argparse.ArgumentParser, plan: str) -> None:
 
 
 def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raise TactileError if an option is below 1 (None is allowed); names : whole-number attributes of options"""
+    """Raise TactileError if an option is below 1 (None is allowed), and for ``--insecure`` without ``--cluster``.
+    names : whole-number attributes of options"""
+    if options.insecure and options.cluster is None:
+        raise TactileError("--insecure", "no --cluster", "one beside it", "Leave --insecure out")
     for name in names:
         value = getattr(options, name)
         if value is not None and value < 1:

@@ -80,6 +80,8 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     engine.check_counts(options, "workers")
     size = _size(options.size)
+    if options.variant is not None and options.preset == "fast":
+        raise TactileError("--variant", "given with --preset fast", "a preset of Mitsuba's", "Leave it out")
     from ...jobs import render, results
     from ...jobs.error_budget import parse_budget
     from ...pictures.mitsuba import variant

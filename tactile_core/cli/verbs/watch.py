@@ -128,8 +128,11 @@ def _check(options: argparse.Namespace) -> None:
             raise TactileError("--speed", f"{options.speed:g}", "--play or --rosbag-play beside it")
         if not 0 <= options.speed <= 1000:
             raise TactileError("--speed", f"{options.speed:g}", "0 to 1000")
-    if options.idle is not None and not 0 <= options.idle < math.inf:
-        raise TactileError("--idle", f"{options.idle:g}", "seconds, 0 or more")
+    if options.idle is not None:
+        if options.play or options.rosbag_play:
+            raise TactileError("--idle", "given with a finished recording", "one that grows", "Leave it out")
+        if not 0 <= options.idle < math.inf:
+            raise TactileError("--idle", f"{options.idle:g}", "seconds, 0 or more")
     if options.out is not None:
         from ...files import atomic
         from ...files.png_writer import SIGNATURE

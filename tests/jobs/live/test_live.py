@@ -357,6 +357,7 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
         (["a.csv", "--serve", "70000"], "0 to 65535"),
         (["a.csv", "--idle", "nan"], "--idle: nan; expected seconds, 0 or more"),
         (["a.csv", "--idle", "-1"], "--idle: -1; expected seconds, 0 or more"),
+        (["a.csv", "--play", "--idle", "2"], "--idle: given with a finished recording"),
         (["--rosbag-play", "none.bag"], "there is no such file"),
         (["--rosbag-play", ""], "there is no such file"),
         (["--rosbag-play", __file__], "no bag"),
