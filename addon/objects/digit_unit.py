@@ -153,6 +153,9 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
     words = "The compositor's nodes change the picture: join Render Layers' Image to their output"
     found += [words] * _composited(scene)
+    space = bpy.data.colorspace.working_space if bpy.app.version >= (5, 0, 0) else "Linear Rec.709"
+    words = f"Working space {space} changes colours of LEDs and files; set Linear Rec.709"
+    found += [words] * (space != "Linear Rec.709")
     output = output_of(scene)
     view, device = output.view_settings, output.display_settings.display_device
     if scene.render.image_settings.file_format.startswith(LINEAR):

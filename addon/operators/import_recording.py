@@ -2,6 +2,7 @@
 
 import functools
 import os
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -11,9 +12,10 @@ from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ...tactile_core.recordings.info import unit_rows
 from ...tactile_core.recordings.opened_file import ENDINGS
+from ...tactile_core.recordings.recording import short_of
 from ...tactile_core.sensors.electrodes import table_of
 from ..objects import axes, biotac_objects, curves, electrode_markers
-from ..settings import properties
+from ..settings import kept_files, properties
 from ..settings.properties import MOTIONS, RecordingOptions
 from ..settings.reports import Refused, TactileOperator, in_blender, reported, shown
 from . import recording_data, set_style, view
@@ -97,10 +99,13 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
     def _import(self, context: bpy.types.Context, path: str) -> int:
         """Import one recording; return the scene's frame of its last. Raises TactileError for one that cannot be."""
-        held, finger = recording_data.fingers(path), int(self.finger or 0)
+        held = [path] if self.columns else recording_data.fingers(path)  # a map names one finger's columns
+        finger = int(self.finger or 0)
         if finger >= len(held):
             raise TactileError(path, f"{len(held)} recordings", f"a finger {finger}", "Import it by itself")
         path = held[finger]
+        if len(held) > 1 and not self.properties.is_property_set("finger"):
+            self.report({"WARNING"}, f"{short_of(path)} is one of {len(held)} recordings; Finger picks another")
         guessed = recording_data.write_columns(path, self)
         if guessed:
             self.report({"WARNING"}, guessed)
@@ -123,6 +128,9 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
             firmest = np.linalg.norm(found.translation.force, axis=1).argmax()
             scene.frame_set(int(frames[firmest]))
             view.fit_timeline(context)
+        if frames[0] < 0:
+            words = f"Frames {frames[0]:g} to {min(frames[-1], -1):g} are not rendered: Blender's range begins at 0"
+            self.report({"WARNING"}, f"{words}. Choose a later First Frame")
         view.open_tab(context)
         there = [thing for thing in scene.objects if thing.tactile.role in ("BIOTAC", "DIGIT") and thing != skin]
         view.show(context, [skin], there)
@@ -166,7 +174,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
             skin.location = before[-1].location
             skin.location.y -= _APART * skin.tactile.per_metre
         about = skin.tactile
-        about.recording = bpy.path.relpath(path) if bpy.data.is_saved else os.path.abspath(path)
+        about.recording = kept_files.shown(Path(os.path.abspath(path)))
         for name in RecordingOptions.__annotations__:
             setattr(about, name, getattr(self, name))
         about.first_frame = self.first_frame

@@ -10,8 +10,11 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.jobs.error_budget import parse_budget
 from ...tactile_core.jobs.results import parse_frames
+from ...tactile_core.recordings import readers
 from ...tactile_core.recordings.opened_file import FOLDER_ENDINGS
+from ...tactile_core.recordings.recording import name_of
 from ..settings import properties
 
 DESCRIPTION = """\
@@ -27,10 +30,17 @@ examples:
 
 def main(arguments: list[str]) -> int:
     """Run the command whose words follow ``--command tactile``; returns the exit status. Blender calls it."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        parse_budget(options.error or "1um")
+    except TactileError as error:
+        parser.error(str(error))
     inputs = [Path(name) for name in options.inputs]
     if options.verb == "batch":
         inputs = _found_in(inputs)
+    if options.columns is None:  # a map names one finger's columns
+        inputs = [finger for path in inputs for finger in _fingers(path)]
     if not inputs:
         print("tactile: error: nothing to do: no recording, scene or .blend there", file=sys.stderr)
         return 1
@@ -108,8 +118,16 @@ def _found_in(folders: list[Path]) -> list[Path]:
     return found
 
 
+def _fingers(path: Path) -> list[Path]:
+    """Return a path for each recording in a file, such as ``hand.mat#1``; the path itself for one, and for none."""
+    try:
+        return [Path(finger) for finger in readers.list_fingers([path])]
+    except ModuleNotFoundError:  # its reader says which
+        return [path]
+
+
 def _folder(out: Path, path: Path) -> Path:
-    return out / (path.parent.resolve().name if path.name == "scene.toml" else path.resolve().stem)
+    return out / (path.parent.resolve().name if path.name == "scene.toml" else name_of(path.resolve()))
 
 
 def _claimed(folder: Path, options: argparse.Namespace) -> None:
@@ -142,6 +160,8 @@ def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
     """Simulate the scene.toml ``path``, or that of the folder ``path``, and write it as a .blend into a folder, its
     recording beside it. options : of the command line"""
     file = path / "scene.toml" if path.is_dir() else path
+    frames = parse_frames(options.frames)  # of its pictures a step can be taken
+    _refuse(path, options, *OF_RECORDINGS, *["frames"] * (frames.start is not None or frames.stop is not None))
     _fresh()
     bpy.ops.tactile.import_scene(filepath=str(file.resolve()))
     _claimed(folder, options)
@@ -159,6 +179,7 @@ def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
         return
     if not path.is_file():
         raise TactileError(path, "there is no such file", "a .blend", "Check the path")
+    _refuse(path, options, *OF_RECORDINGS, "seed")
     bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))
     bpy.context.view_layer.objects.active = None  # F12 renders the camera's gel, not the active one's
     _choose(options.frames)
@@ -177,6 +198,16 @@ def _choose(text: str) -> None:
         expected = f"some of {scene.frame_start} to {scene.frame_end}, which the scene plays"
         raise TactileError("--frames", f"{text} takes none", expected, "Widen it")
     scene.frame_start, scene.frame_end = chosen[0], chosen[-1]
+
+
+def _refuse(path: Path, options: argparse.Namespace, *names: str) -> None:
+    """Raise TactileError for an option of ``names`` that was given: nothing is done to ``path`` by it. A batch may hold
+    others that take it."""
+    usual = _parser().parse_args([options.verb, "-", "--out", "-"])
+    for name in names if options.verb != "batch" else ():
+        if getattr(options, name) != getattr(usual, name):
+            found = f"given for {path}, to which it does nothing"
+            raise TactileError(f"--{name.replace('_', '-')}", found, "an input that takes it", "Leave it out")
 
 
 def _for(path: Path) -> Callable:
@@ -216,6 +247,7 @@ def _pictures(folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.render.render(animation=True)
 
 
+OF_RECORDINGS = "tare", "polarity", "weights", "columns", "sensor", "frames_apart", "contacts", "ball", "to"
 VERBS = {"convert": convert, "simulate": simulate, "render": render}
 _command = None
 

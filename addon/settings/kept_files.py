@@ -41,7 +41,7 @@ def _own(name: str) -> Path:
 
 def shown(file: Path) -> str:
     """Return a file's path as the .blend holds it: relative to the .blend if that was saved."""
-    return bpy.path.relpath(os.fspath(file)) if bpy.data.is_saved else os.fspath(file)
+    return _relative(file, Path(bpy.data.filepath).parent) if bpy.data.is_saved else os.fspath(file)
 
 
 def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:

@@ -4,6 +4,7 @@ import subprocess
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -80,6 +81,33 @@ def test_a_preset_that_is_none_ends_before_the_work(run, tmp_path, capfd):
     with pytest.raises(SystemExit, match="2"):
         run("convert", "touch.csv", "--out", tmp_path, "--preset", "best")
     assert "'best'" in capfd.readouterr().err and not [*tmp_path.iterdir()]
+
+
+def test_each_finger_of_a_file_is_converted(run, slide_csv, needs, tmp_path):
+    """Only the first was, without a word."""
+    needs("scipy")
+    import scipy.io
+
+    counts = np.loadtxt(slide_csv(), delimiter=",", skiprows=1)[:, -19:].T
+    pdc = np.full((1, 150), 2000.0)
+    hand = {"F0Electrodes": counts[::-1], "F0pdc": pdc, "F1Electrodes": counts, "F1pdc": pdc}
+    scipy.io.savemat(tmp_path / "hand.mat", hand)
+    assert run("convert", tmp_path / "hand.mat", "--out", tmp_path / "out", "--frames", "60:62") == 0
+    assert run("convert", f"{tmp_path / 'hand.mat'}#1", "--out", tmp_path / "second", "--frames", "60:62") == 0
+    made = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.blend"))
+    first, second = (f"hand_finger{k}/hand_finger{k}.blend" for k in (0, 1))
+    assert made == [f"out/{first}", f"out/{second}", f"second/{second}"]
+
+
+def test_options_that_would_do_nothing_are_refused(run, tmp_path, capfd):
+    (tmp_path / "touch.blend").touch()
+    press, out = ROOT / "scenes" / "press", ("--out", tmp_path / "out")
+    for words in (("render", tmp_path / "touch.blend", "--ball", "28"), ("simulate", press, "--frames", "0:4")):
+        assert run(*words, *out) == 1
+        assert f"{words[2]}: given for {words[1]}, to which it does nothing" in capfd.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        run("convert", "touch.csv", *out, "--error", "best")
+    assert "--error: 'best'; expected" in capfd.readouterr().err
 
 
 def test_simulate_a_scene(run, tmp_path):

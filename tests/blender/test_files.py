@@ -40,7 +40,7 @@ def test_the_menu_says_so(part):
     assert all(ending in said[0] for ending in (".csv", ".h5", ".npz", ".mat", ".json", ".bag", ".mcap"))
 
 
-def test_a_finger_of_a_hand_is_picked_from_a_menu(counts, part, needs, tmp_path):
+def test_a_finger_of_a_hand_is_picked_from_a_menu(counts, part, needs, tmp_path, capfd):
     needs("scipy")
     import scipy.io
 
@@ -58,9 +58,13 @@ def test_a_finger_of_a_hand_is_picked_from_a_menu(counts, part, needs, tmp_path)
     bpy.ops.tactile.import_recording(filepath=str(path), finger="1")
     second, recording = shown(), bpy.context.object.tactile.recording
     assert recording.endswith("hand.mat#1")
+    assert "Finger picks" not in capfd.readouterr().out
     bpy.ops.tactile.import_recording(filepath=str(path))
+    assert "hand.mat#0 is one of 2 recordings; Finger picks another" in capfd.readouterr().out
     assert np.abs(second - shown()).max() > 50
     bpy.ops.tactile.translate()
+    if importlib.util.find_spec("msgspec") is not None:  # a map picks one finger, which was refused
+        bpy.ops.tactile.import_recording(filepath=str(path), columns=str(tmp_path / "map.toml"))
 
 
 def test_a_bag_says_what_it_lacks(part, tmp_path):

@@ -220,6 +220,24 @@ def test_one_frame_is_enough(imported, nodes_of, wanted):
     np.testing.assert_allclose(nodes_of(skin), wanted(80), atol=TOLERANCE)
 
 
+def test_frames_before_0_which_no_range_of_blender_s_holds_are_named(imported, scene, capfd):
+    imported(frames="40:42", first_frame=-41)
+    assert "Frames -1 to -1 are not rendered" in capfd.readouterr().out
+    imported(frames="40:42", first_frame=-40)
+    assert "not rendered" not in capfd.readouterr().out
+
+
+def test_a_recording_on_another_drive_keeps_its_whole_path(imported, tmp_path, monkeypatch):
+    """On Windows no relative path leads there: the import ended in a traceback, half done."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "here.blend"))
+
+    def on_another_drive(*_):
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr("os.path.relpath", on_another_drive)
+    assert imported(frames="70:72").tactile.recording == str(RECORDING)
+
+
 def test_undo_takes_it_back(imported, scene):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="before")

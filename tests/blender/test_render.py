@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -213,6 +214,15 @@ def test_colours_of_the_output_alone_are_seen_and_set_back(ready, wanted, left_o
     assert left_out() == ["Exposure, Color BW change the levels; Set Up Render sets Raw alone"]
     bpy.ops.tactile.set_up_render()
     assert left_out() == [] and image.color_management == "FOLLOW_SCENE"
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0, 0), reason="before Blender 5 there is one working space")
+def test_another_working_space_is_said(scene, part):
+    """By Standard levels were up to 99 off."""
+    bpy.ops.wm.set_working_color_space(working_space="ACEScg")
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    bpy.ops.tactile.set_up_render()
+    assert re.match("Working space ACEScg", part("addon.objects.digit_unit").left_out(scene, bpy.context.object)[0])
 
 
 def test_set_up_render_leaves_nothing_in_the_picture_s_place(ready, rendered, left_out):

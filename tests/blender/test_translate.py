@@ -186,7 +186,10 @@ def test_a_sensor_in_edit_mode_is_refused_and_keeps_its_keys(gel, name):
 
 @pytest.mark.parametrize(("holder", "name"), [("gel", "show_only_shape_key"), ("keys", "use_relative")])
 def test_a_gel_that_its_keys_do_not_move_is_refused(gel, part, holder, name):
-    """Its picture was that of one shape key, or of rest, on every frame."""
+    """Its picture was that of one shape key, or of rest, on every frame; where NLA strips play the keys, too."""
+    moves = gel.data.shape_keys.animation_data
+    moves.nla_tracks.new().strips.new("pushed down", 70, moves.action)
+    moves.action = None
     setattr(gel if holder == "gel" else gel.data.shape_keys, name, True)
     with pytest.raises(part("tactile_core.errors").TactileError, match=r"DIGIT gel: .*: it does not move"):
         part("addon.operators.pictures").draw(gel, bpy.context.evaluated_depsgraph_get(), "fast")
