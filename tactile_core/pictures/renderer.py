@@ -93,7 +93,7 @@ class Renderer:
         self.background = resting_picture(calibration, self.rest_radiance).astype(np.float32)
         if background is not None:
             self.background = _given_background(background, self.background)
-        self._ends = np.stack(ends(self.background)).reshape(4, self.camera.height, -1)
+        self._ends = ends(self.background)
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
         self._rest_picture = None if self.dots else self.picture(self.rest_radiance)
 
@@ -188,11 +188,12 @@ class Renderer:
             raise TactileError("markers", found, "the gel's displacement", advice)
         if noise is None and marks is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
             now, at_rest = np.moveaxis(radiance, -1, 0), np.moveaxis(self.rest_radiance, -1, 0)
-            picture, rows = np.empty(self.background.shape, np.uint8), (len(self.background), -1)
-            background, drawn = self.background.reshape(rows), picture.reshape(rows)
-            _fill_levels(now, at_rest, self._response, background, self._ends, np.float32(LARGEST_LEVEL), drawn)
+            picture = np.empty(self.background.shape, np.uint8)
+            fields = self.background, self._ends, picture
+            background, curve, drawn = (field.reshape(*field.shape[:-2], -1) for field in fields)
+            _fill_levels(now, at_rest, self._response, background, curve, np.float32(LARGEST_LEVEL), drawn)
             return picture
-        levels = self.background + bent(self.in_levels(radiance - self.rest_radiance), self.background)[0]
+        levels = self.background + bent(self.in_levels(radiance - self.rest_radiance), self._ends)[0]
         if marks is not None:
             levels *= marks[..., None]
         if noise is not None:

@@ -16,7 +16,7 @@ from gel_pictures import NO_MITSUBA, Press
 from tactile_core.cli.main import main
 from tactile_core.jobs.frames_file import FramesFile
 from tactile_core.jobs.render import Pictures
-from tactile_core.pictures.camera_curve import bent
+from tactile_core.pictures.camera_curve import bent, ends
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors import digit_surface
@@ -135,7 +135,7 @@ def test_exr_holds_radiance_and_the_picture_follows_from_it(render, heights, tmp
         for name in "RGB"
     ]
     untouched = Renderer(small, "fast").background
-    levels = np.clip(np.rint(untouched + bent(np.stack(drawn, -1) - untouched, untouched)[0]), 0, 255)
+    levels = np.clip(np.rint(untouched + bent(np.stack(drawn, -1) - untouched, ends(untouched))[0]), 0, 255)
     shown = picture(tmp_path / "out" / "images" / "00002.png")
     assert np.abs(levels - shown).max() <= 1  # the sum in another order may round otherwise
     assert np.mean(levels != shown) < 1e-3

@@ -5,7 +5,7 @@ import pytest
 from gel_pictures import Press
 
 from tactile_core.pictures import renderer
-from tactile_core.pictures.camera_curve import FLOOR, SHOULDER, TOE, bent
+from tactile_core.pictures.camera_curve import FLOOR, SHOULDER, TOE, bent, ends
 from tactile_core.sensors.calibration_file import load_calibration
 
 REST = 100.0
@@ -13,7 +13,7 @@ REST = 100.0
 
 def curve(levels):
     change = np.asarray(levels, np.float32) - np.float32(REST)
-    shown, slope = bent(change, np.full_like(change, REST))
+    shown, slope = bent(change, ends(np.full_like(change, REST)))
     return REST + shown, slope
 
 
@@ -37,7 +37,7 @@ def test_levels_stay_between_the_ends_and_in_order_and_slopes_are_theirs():
 
 @pytest.mark.parametrize("rest", [-20.0, 0.0, 30.0, 211.0, 254.0, 255.0, 300.0])
 def test_the_untouched_gel_stays(rest):
-    assert bent(np.zeros(1, np.float32), np.full(1, rest, np.float32))[0] == 0
+    assert bent(np.zeros(1, np.float32), ends(np.full(1, rest, np.float32)))[0] == 0
 
 
 def test_deep_contacts_hold_no_level_of_0_or_255_compiled_or_not(monkeypatch):

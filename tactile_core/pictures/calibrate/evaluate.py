@@ -13,7 +13,7 @@ import numpy as np
 from ...accuracy import Row, row
 from ...errors import TactileError
 from ...sensors.calibration import LARGEST_LEVEL, Calibration
-from ..camera_curve import bent
+from ..camera_curve import bent, ends
 from .ball_pictures import BallPictures, FastPictures, working_factor
 from .photo_metrics import metrics
 from .photographs import Photographs, Press
@@ -122,7 +122,7 @@ def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple
     """Return the picture (H, W, 3) uint8 of a press and its metrics against the photograph; the photograph's drift of
     light is added. change : (H, W, 3) levels, by the press; background : (H, W, 3) levels"""
     untouched = background + press.drift
-    picture = np.rint(untouched + bent(change, untouched)[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
+    picture = np.rint(untouched + bent(change, ends(untouched))[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..camera_curve import bent
+from ..camera_curve import bent, ends
 from .ball_pictures import BallPictures, smaller, working_factor
 from .photo_metrics import windowed
 from .photographs import Press, dilated
@@ -68,7 +68,7 @@ class Ball(NamedTuple):
 
 class Sight:
     """What a fit reads of a photograph: change (h, w, 3) in reduced pixels, and the mask (h, w) of the n that count.
-    shown : (n, 3) levels of change in those; untouched : (n, 3) levels, the gel at rest, in that day's light
+    shown : (n, 3) levels of change in those
     factor : by which the photograph is reduced; None for ``working_factor``"""
 
     def __init__(self, press: Press, factor: int | None = None) -> None:
@@ -79,12 +79,13 @@ class Sight:
         self.region = smaller(press.touched.astype(np.float32), factor) > 0.25
         self.counts = dilated(self.region, MARGIN) & ~spoilt
         self.shown = self.change[self.counts]
-        self.untouched = smaller(press.picture.astype(np.float32), factor)[self.counts] - self.shown
+        untouched = smaller(press.picture.astype(np.float32), factor)[self.counts] - self.shown  # in that day's light
+        self._ends = ends(untouched)
 
     def missed(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return residuals (n, 3), levels, of a ``change`` (n, 3) of linear light, and the camera curve's slopes (n,
         3)."""
-        seen, slope = bent(change, self.untouched)
+        seen, slope = bent(change, self._ends)
         return seen - self.shown, slope
 
     def radius(self, common: float) -> float:

@@ -12,7 +12,7 @@ from tactile_core.pictures.calibrate import fit
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures, MitsubaPictures
 from tactile_core.pictures.calibrate.fit import calibrate
 from tactile_core.pictures.calibrate.photographs import Photographs, press_of
-from tactile_core.pictures.camera_curve import bent
+from tactile_core.pictures.camera_curve import bent, ends
 from tactile_core.pictures.mitsuba.variant import LLVM
 from tactile_core.pictures.presets import QUALITY, STANDARD
 
@@ -47,7 +47,7 @@ def test_spread_is_found_again_and_albedo_is_named_as_hardly_seen(unit, tmp_path
     made, rest = MitsubaPictures(QUALITY)(true), np.full((*unit.camera.shape, 3), float(GREY), np.float32)
     presses = []
     for k, ball in enumerate(BALLS):
-        picture = np.rint(rest + bent(made.change(ball), rest)[0]).clip(0, 255).astype(np.uint8)
+        picture = np.rint(rest + bent(made.change(ball), ends(rest))[0]).clip(0, 255).astype(np.uint8)
         presses.append(press_of(f"{k}.png", picture, rest))
     photographs = Photographs(tmp_path, tuple(presses), rest, False, (), (1.0, 1.0, 1.0))
     start = dataclasses.replace(unit, coating=dataclasses.replace(unit.coating, spread=0.15e-3))
