@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     keep = _keep(options.keep)
     if options.grid:
         return _run_grid(options, keep)
-    for name in ("workers", "cluster"):
+    for name in ("workers", "cluster", "insecure"):
         if getattr(options, name):
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     if options.plan:
