@@ -24,6 +24,7 @@ AT_REST = 0.55, 0.97  # shares of the range between which a unit's electrodes re
 BEYOND = 1.01  # times the range, that no reading exceeds but by noise (assumed)
 LEAST_RAW = 0.3  # share of the range below which raw readings of an electrode do not fall (assumed)
 MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assumed)
+OF_ELECTRODES = "in the electrodes' unit"
 PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "psi": 6894.757}  # Pa
 # For pressures converted from counts: how well readings lie on steps of one count (1: all do), and steps they span.
 ON_STEPS, FEWEST_STEPS = 0.8, 4.0  # assumed
@@ -84,7 +85,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return how many counts 1 in pdc (T,) means, 0 if unknown, and the name of its unit of pressure, "" for counts.
+    """Return how many counts 1 in pdc (T,) means, 0 if unknown, and the name of its unit, "" for counts of any bits.
     unit : counts that 1 means in the file's electrodes"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
@@ -92,14 +93,17 @@ def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str
         return unit, ""
     parts = np.append(values - np.rint(values), 0.0 if len(values) == 1 else [])  # of one value alone it has to be 0
     whole, within = np.ptp(parts) < 1e-6, np.percentile(known, 99) <= MOST_PDC
-    of_electrodes = values[-1] > COUNT_MAX if unit < 1 else unit > 1 and whole and values[-1] > 0
+    fewer_bits = 1 < unit < COUNT_MAX / 100.0  # not percent, shares or volts, which are not whole
+    of_electrodes = values[-1] > COUNT_MAX if unit < 1 else fewer_bits and whole and values[-1] > 0
     if of_electrodes and values[-1] <= MOST_PDC / unit:
         return unit, ""
     factors = {words: pascal / of_kind(sensor, Fluid).readout.pressure for words, pascal in PRESSURES.items()}
+    if unit > 1:
+        factors = {OF_ELECTRODES: unit, **factors}
     gap = np.diff(values).min() if len(values) > 1 else 1.0
     if whole and within and gap * factors["Pa"] < 0.9:  # else Pa in whole numbers, a count apart
         return 1.0, ""
-    for words, factor in factors.items():  # the finest first: the steps of others are multiples of its
+    for words, factor in factors.items():  # of pressures the finest first: steps of others are multiples of its
         steps = abs(np.exp(2j * np.pi * factor * values).mean())
         if steps > ON_STEPS and factor * np.ptp(values) >= FEWEST_STEPS and factor * values[-1] <= MOST_PDC:
             return factor, words

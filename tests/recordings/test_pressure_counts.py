@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core.recordings.preparer import Preparer
-from tactile_core.recordings.signal_kind import PRESSURES, counts_a_unit, in_counts
+from tactile_core.recordings.signal_kind import OF_ELECTRODES, PRESSURES, counts_a_unit, in_counts
 
 COUNT = 36.5  # Pa
 RNG = np.random.default_rng(0)
@@ -34,6 +34,17 @@ def test_a_single_glitch_makes_no_pressure_of_counts():
 @pytest.mark.parametrize(("words", "decimals", "rest"), [("kPa", 1, 2405), ("psi", 2, 2405), ("Pa", -2, 2405)])
 def test_a_coarsely_rounded_pressure_is_told_by_its_level(words, decimals, rest):
     assert counts_a_unit(np.round((rest + RISE) * COUNT / PRESSURES[words], decimals), 1.0, "biotac")[1] == words
+
+
+@pytest.mark.parametrize("full", [1.0, 3.3, 5.0, 100.0])  # shares, volts, percent
+@pytest.mark.parametrize("rest", [0, 962, 2405], ids="{} at rest".format)
+def test_pdc_in_the_unit_of_the_electrodes_is_told(full, rest):
+    unit = 4095 / full
+    assert counts_a_unit(np.round((rest + RISE) / unit, 6), unit, "biotac") == (unit, OF_ELECTRODES)
+    if rest:  # by its level
+        assert counts_a_unit((rest + RISE + RNG.uniform(-0.5, 0.5, 350)) / unit, unit, "biotac")[0] == unit
+    assert counts_a_unit(rest + RISE, unit, "biotac") == (1.0, "")
+    assert counts_a_unit(np.round((rest + RISE) * COUNT / 1e3, 4), unit, "biotac")[1] == "kPa"
 
 
 def test_a_held_or_whole_pressure_is_told():
