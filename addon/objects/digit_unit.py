@@ -19,6 +19,7 @@ from . import axes, digit_body, digit_materials, motion, surfaces
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
 LINEAR = "OPEN_EXR", "HDR", "DPX", "CINEON"  # how the names of file formats of linear light begin
 _VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
+_DRAWN = "GPENCIL", "GREASEPENCIL"  # types of objects that Blender itself draws over each engine's picture
 _STEP = 1e-7  # m, largest movement taken for rounding
 _STRAIGHT = 1e-3  # largest component of a turn of the camera's axes taken for none
 _OFF_BAND = 1e-6  # brightness, levels m^2, taken for none: a hundred-thousandth of an LED's
@@ -151,6 +152,10 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         found.append(f"{camera.name}: depth of field is left out")
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
+    drawn = [thing.name for thing in scene.objects if thing.type in _DRAWN and thing in rendered]
+    strips = getattr(scene.sequence_editor, "strips_all" if bpy.app.version >= (4, 4, 0) else "sequences_all", ())
+    drawn += ["sequencer"] * bool(scene.render.use_sequencer and len(strips))
+    found += [f"Blender draws over the picture: {', '.join(drawn)}; hide it, or switch it off"] * bool(drawn)
     words = "The compositor's nodes change the picture: join Render Layers' Image to their output"
     found += [words] * _composited(scene)
     space = bpy.data.colorspace.working_space if bpy.app.version >= (5, 0, 0) else "Linear Rec.709"

@@ -112,8 +112,10 @@ def check(*things: bpy.types.Object | None) -> None:
     """Raise TactileError if the mesh cache that moves one of these objects is missing at the path in the .blend."""
     for thing in filter(None, things):
         for modifier in thing.modifiers:
-            path = Path(bpy.path.abspath(modifier.filepath)) if modifier.type == "MESH_CACHE" else None
-            if path is not None and not path.is_file():
+            if modifier.type != "MESH_CACHE":
+                continue
+            path = Path(bpy.path.abspath(modifier.filepath, library=thing.library))  # a linked object's file is there
+            if not path.is_file():
                 advice = f"Move the folder {kept_files.CACHE} with the .blend, or import or translate again"
                 raise TactileError(thing.name, f"its mesh cache {path} is gone", "the file that moves it", advice)
 

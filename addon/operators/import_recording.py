@@ -118,7 +118,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         if placed:
             sensors.electrodes(source)  # a bad table is refused before anything is made
         view.hide_untouched(scene)
-        kept = self._keep_scene(scene)
+        kept = self._keep_scene(scene, found.recording.rate)
         frames = self.first_frame + found.chosen.astype(float)
         skin = self._skin(scene, path, found)
         skin.tactile.motion = "SHAPE_KEYS" if found.skin.file is None else recording_data.MESH_CACHE
@@ -143,16 +143,19 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         self.report({"INFO"}, f"{name}{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}{kept}")
         return int(frames[-1])
 
-    def _keep_scene(self, scene: bpy.types.Scene) -> str:
+    def _keep_scene(self, scene: bpy.types.Scene, rate: float) -> str:
         """Set the scene's units, but keep those and the frame rate of a scene that is not empty, unless the user chose
-        to set them. Return words on what was kept, to end a sentence."""
+        to set them. Return words on what was kept, to end a sentence. rate : of the recording, Hz"""
         if self._in_millimetres(scene):
             view.use_millimetres(self, scene)
         if view.is_new(scene) and properties.of_role(scene, "BIOTAC") is None:
             return ""
         if not self.properties.is_property_set("set_timeline"):
             self.set_timeline = False
-        return "" if self.set_timeline else ". The scene's own frame rate and range are kept"
+        if self.set_timeline:
+            return ""
+        speed = scene.render.fps / scene.render.fps_base / rate
+        return f". The scene's own frame rate and range are kept: it plays {speed:.3g} times as fast as recorded"
 
     def _in_millimetres(self, scene: bpy.types.Scene) -> bool:
         return self.millimetres and (view.is_new(scene) or self.properties.is_property_set("millimetres"))

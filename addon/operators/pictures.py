@@ -12,7 +12,7 @@ from ...tactile_core.pictures import height_map, seen_fields
 from ...tactile_core.pictures.renderer import Renderer
 from ...tactile_core.sensors.calibration import Calibration
 from ...tactile_core.translation import gel_place
-from ..objects import axes, digit_objects, digit_unit, frame_attribute, images
+from ..objects import axes, digit_objects, digit_unit, images
 from ..process import tracer_process
 from ..settings import properties, render_settings, reports
 from . import view
@@ -89,12 +89,7 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
     shown, moved = shown_state(gel, depsgraph, size)
     unit = shown.unit
     heights = height_map.height_map(moved, unit.camera)
-    known = gel.evaluated_get(depsgraph).data.attributes.get(frame_attribute.PATCH)
-    touched = np.empty(len(moved), np.float32)
-    if known is None:
-        touched = gel_place.contact_patch(moved[None], unit.camera.surface)[0]
-    else:
-        known.data.foreach_get("value", touched)
+    touched = gel_place.contact_patch(moved[None], unit.camera.surface)[0]  # whatever has become of the attribute
     found = seen_fields.seen_fields(renderer_of(unit), heights, moved, touched)
     return {
         "Height": 1e3 * found["Height"][..., None], "Normal": axes.to_blender(found["Normal"], 1),

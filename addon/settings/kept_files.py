@@ -45,8 +45,9 @@ def shown(file: Path) -> str:
 
 
 def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:
-    """Yield, for each path in the .blend, the owner, the name of its property, and the name of the folder it is for."""
-    for thing in bpy.data.objects:
+    """Yield, for each path in the .blend, the owner, the name of its property, and the name of the folder it is for.
+    Paths of linked objects start from their own .blend."""
+    for thing in (each for each in bpy.data.objects if each.library is None):
         for name in _PATHS:
             if getattr(thing.tactile, name):
                 yield thing.tactile, name, SIMULATIONS

@@ -173,6 +173,22 @@ def test_a_library_override_is_lit_when_it_is_opened_again(gel, draw, tmp_path):
     assert "Tactile style" in gel.modifiers and np.abs(draw(gel) - before).max() <= 1
 
 
+def test_a_linked_gel_plays_the_cache_beside_its_own_blend(imported, part, tmp_path):
+    """Its picture was refused, as the cache was looked for beside the .blend that links it."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    imported(frames="70:72", motion="MESH_CACHE")
+    bpy.ops.tactile.translate()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, taken):
+        taken.objects = ["DIGIT gel"]
+    (tmp_path / "elsewhere").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "elsewhere" / "user.blend"))
+    part("addon.objects.mesh_cache").check(*taken.objects)
+    assert not (tmp_path / "elsewhere" / "tactile_cache").exists()
+
+
 def test_an_instance_is_told_from_a_gel(gel, draw, tmp_path):
     before, group = draw(gel), bpy.context.scene.collection.children[0]
     bpy.context.scene.collection.children.unlink(group)

@@ -124,6 +124,7 @@ def test_a_multilayer_exr_holds_what_the_pixels_see(ready, rendered, part, tmp_p
         kind.media_type = "MULTI_LAYER_IMAGE"
     kind.file_format, kind.exr_codec, kind.color_depth = "OPEN_EXR_MULTILAYER", "NONE", "32"
     ready.frame_set(80)
+    bpy.data.images.remove(bpy.data.images["DIGIT gel contact patch"])  # as one that was unpacked and lost
     ready.render.filepath = str(tmp_path / "frame.exr")
     bpy.ops.render.render(write_still=True)
     found = _channels(tmp_path / "frame.exr")
@@ -233,6 +234,21 @@ def test_set_up_render_leaves_nothing_in_the_picture_s_place(ready, rendered, le
     bpy.ops.tactile.set_up_render()
     assert not render.use_sequencer
     np.testing.assert_array_equal(rendered(), whole)
+
+
+def test_what_blender_draws_over_each_engine_s_picture_is_said(ready, left_out):
+    """Strokes lay over the picture, and strips in its place, without a word."""
+    since = bpy.app.version >= (4, 3, 0)
+    (bpy.ops.object.grease_pencil_add if since else bpy.ops.object.gpencil_add)(type="STROKE")
+    editor, long = ready.sequence_editor_create(), {"length" if bpy.app.version >= (5, 0, 0) else "frame_end": 90}
+    strips = editor.strips if bpy.app.version >= (4, 4, 0) else editor.sequences
+    strips.new_effect(name="white", type="COLOR", channel=1, frame_start=1, **long)
+    ready.render.use_sequencer = True
+    over = f"{bpy.context.object.name}, sequencer"
+    assert left_out() == [f"Blender draws over the picture: {over}; hide it, or switch it off"]
+    bpy.context.object.hide_render = True
+    bpy.ops.tactile.set_up_render()
+    assert left_out() == []
 
 
 def test_a_compositor_that_changes_the_picture_is_said(ready, left_out):

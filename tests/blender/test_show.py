@@ -22,12 +22,13 @@ def test_untouched_objects_of_a_new_file_are_hidden(new_file, imported):
     assert scene.unit_settings.scale_length == pytest.approx(1e-3)
 
 
-def test_a_moved_cube_stays_and_with_it_the_scene_s_units_and_rate(new_file, imported):
+def test_a_moved_cube_stays_and_with_it_the_scene_s_units_and_rate(new_file, imported, capfd):
     new_file.objects["Cube"].location.x = 3
     imported(frames="70:90")
     scene = bpy.context.scene
     assert not scene.objects["Cube"].hide_viewport
     assert scene.unit_settings.scale_length == 1 and scene.render.fps == 24
+    assert "range are kept: it plays 0.24 times as fast as recorded" in capfd.readouterr().out
     # What was kept here is no choice for the next import, which a window would begin with it.
     choices = bpy.ops.tactile.import_recording.get_rna_type().properties
     assert choices["set_timeline"].is_skip_save and choices["millimetres"].is_skip_save
