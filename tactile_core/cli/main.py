@@ -87,6 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stream = getattr(sys, name)
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
+    if os.environ.get("MPLBACKEND", "").startswith("module://"):
+        del os.environ["MPLBACKEND"]  # a notebook's, whose module another environment lacks
     parser = _parser()
     options, unknown = parser.parse_known_args(arguments)
     if unknown:

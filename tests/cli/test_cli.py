@@ -134,6 +134,13 @@ def test_what_the_system_refuses_is_one_line(tactile, slide_csv, tmp_path):
         assert status == 2 and str(table if arguments[0] == "info" else long) in only_line(said)
 
 
+def test_a_notebook_s_backend_is_not_needed(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "module://absent.backend_inline")
+    with pytest.raises(SystemExit, match="0"):
+        main(["--help"])
+    subprocess.run([sys.executable, "-c", "import matplotlib"], check=True, timeout=120)
+
+
 def test_info_may_be_cut_by_its_reader(slide_csv):
     line = f'"{sys.executable}" -m tactile_core info {" ".join([str(slide_csv())] * 40)}'
     done = subprocess.run(
