@@ -30,6 +30,7 @@ ALWAYS = {
     "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact (not where rectified)"),
     "pressure": ("Pa", "rise of the fluid's, estimated from the electrodes alone; 0 where the force is"),
     "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
+    "contact_normal": ("1", "(T, 3) unit normal of the resting skin at the dent, inward, sensor frame; NaN likewise"),
     "confidence": ("1", "0 (a guess) to 1"),
     "expected_error_biotac": ("m", "expected largest node error: half of such frames have less"),
     "expected_error_digit": ("m", "as much of the DIGIT's gel"),

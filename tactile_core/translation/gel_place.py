@@ -1,4 +1,5 @@
-"""Find where on a gel a contact lies, its centre and patch, and shift contacts. frame : the gel's `ContactFrame`"""
+"""Find where a contact lies, its centre and patch on the gel, its normal on the skin, and shift contacts.
+frame : the gel's `ContactFrame`"""
 
 from __future__ import annotations
 
@@ -43,6 +44,14 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
     return center
+
+
+def contact_normal(displacement: np.ndarray, skin: Lattice) -> np.ndarray:
+    """Return the unit normal (T, 3) float32, inward, of the resting ``skin`` at a dent: that of an even object there.
+    displacement : (T, n, 3) m of the skin's nodes; NaN if no node moves by 10 um"""
+    inward = -node_normals(skin.rest, skin.faces)
+    normal = accuracy.core_center(np.einsum("tni,ni->tn", displacement, inward), inward)
+    return (normal / accuracy.lengths(normal)[:, None]).astype(np.float32)
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:

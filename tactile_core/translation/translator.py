@@ -19,7 +19,7 @@ from .answer import MEAN, Answer
 from .card import DOUBT, KINDS, PARTS, PLACE, REST, STATE, SURFACES, doubt, error_bound, silent_level
 from .contact_frame import STILL
 from .contact_track import Evidence
-from .gel_place import contact_center, elsewhere
+from .gel_place import contact_center, contact_normal, elsewhere
 from .layers import COMPRESSED_LIMIT, DISTANCES
 from .networks import Networks
 from .posterior import FORCE_SCALE, touches
@@ -51,6 +51,7 @@ class Translation(Summary):
     force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact
     pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero without contact
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
+    contact_normal : (T, 3), unit normal of the BioTac's resting skin at the dent, inward, sensor frame; NaN likewise
     confidence : (T,), share of simulated frames like this one whose largest node error is below ``error_bound_digit``;
         lower far from the training, and at most `UNTRAINED_CONFIDENCE` if a flag doubts the frame
     expected_error_biotac, expected_error_digit : (T,) m, median of the largest node error in frames like this one;
@@ -70,6 +71,7 @@ class Translation(Summary):
     force: np.ndarray
     pressure: np.ndarray
     contact_center: np.ndarray
+    contact_normal: np.ndarray
     confidence: np.ndarray
     expected_error_biotac: np.ndarray
     expected_error_digit: np.ndarray
@@ -165,6 +167,8 @@ class Translator:
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])
+        normal = contact_normal(skin, sensors.sensor_surface(self.source))
+        normal[silent] = np.nan
         way = self._mounted, self.silent("digit_m"), signals.stiffness
         beside = second_contact(nets, evidence.second, silent, *way)
         both = beside.rows
@@ -192,6 +196,7 @@ class Translator:
             error[held] = np.maximum(error[held], accuracy.lengths(moved[held]).max(axis=1))
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel, pressure=pressure, contact_center=center,
+            contact_normal=normal,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
             confidence=confidence, flags=flags, explained=explained, second_center=beside.center,
             second_force=beside.force, **self._errors(expected, rectified, center[:, 0]),

@@ -32,10 +32,11 @@ def translate(signals: Signals) -> Translation:
     skin, gel = _dent(sensors.biotac_surface().rest, depth), _dent(sensors.digit_surface().rest, depth)
     force = np.outer(depth, [0, 0.01, 0]).astype(np.float32)
     center = np.where(depth[:, None] > 5, np.float32([-8e-3, 0]), np.float32(np.nan))
+    normal = np.where(depth[:, None] > 5, np.float32([0, 1, 0]), np.float32(np.nan))
     flags = np.where(depth > 100, Flag.OUT_OF_RANGE, 0).astype(np.uint16)
     errors = [share * depth * np.float32(1e-6) for share in (0.1, 0.1, 0.2, 0.2)]
     return Translation(
-        *codes, skin, gel, force, 50 * depth, center, np.exp(-depth / 100), *errors, flags, np.exp(-depth / 50),
+        *codes, skin, gel, force, 50 * depth, center, normal, np.exp(-depth / 100), *errors, flags, np.exp(-depth / 50),
         np.full_like(center, np.nan), np.zeros_like(force),
     )  # fmt: skip
 

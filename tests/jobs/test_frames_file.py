@@ -10,7 +10,7 @@ from tactile_core.jobs.frames_file import ALWAYS, FramesFile
 from tactile_core.recordings import flags
 
 FRAMES = 5
-SHAPES = {"electrodes": (19,), "force": (3,), "contact_center": (2,)}
+SHAPES = {"electrodes": (19,), "force": (3,), "contact_center": (2,), "contact_normal": (3,)}
 
 
 @pytest.fixture

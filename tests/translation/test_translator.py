@@ -10,6 +10,7 @@ import pytest
 from tactile_core import accuracy, recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
+from tactile_core.sensors import unrolling
 from tactile_core.translation import card as cards
 from tactile_core.translation import contact_frame, networks, translate
 from tactile_core.translation.gel_place import elsewhere
@@ -69,6 +70,21 @@ def test_force_and_place_follow_the_truth(shipped, translation):
     apart = np.linalg.norm(translation.contact_center[here] - shipped.truth.contact_center[here], axis=1)
     # The first and last frames of a touch may be lost.
     assert np.nanmedian(apart) < 1.5e-3 and np.isfinite(apart).mean() > 0.9
+
+
+def test_the_normal_is_the_skins_at_the_true_place(shipped, translation):
+    assert np.array_equal(np.isnan(translation.contact_normal[:, 0]), np.isnan(translation.contact_center[:, 0]))
+    here = touched(shipped) & np.isfinite(translation.contact_center[:, 0])
+    found = translation.contact_normal[here]
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-5)
+    true = -np.array([unrolling.roll_up(place)[1] for place in shipped.truth.contact_center[here]])
+
+    def off(normals):
+        return np.median(np.degrees(np.arccos(np.clip((normals * true).sum(1), -1, 1))))
+
+    constant = true.mean(0) / np.linalg.norm(true.mean(0))
+    force = translation.force[here] / np.linalg.norm(translation.force[here], axis=1, keepdims=True)
+    assert off(found) < 3 and off(found) < 0.5 * min(off(constant), off(force))  # measured 1.9, 4.8, 5.5 degrees
 
 
 def test_silence_stays_silent(shipped, translation):

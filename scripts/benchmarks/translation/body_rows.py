@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table.translation_methods import plain_signals
+from tactile_core import sensors
 from tactile_core.accuracy import Row, lengths, peak_depth_error, row
 from tactile_core.jobs import solved_gel
 from tactile_core.jobs.pairs import make_pairs
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.step_errors import Bodies, true_displacement
-from tactile_core.translation.translator import Translator
+from tactile_core.translation.gel_place import contact_normal
+from tactile_core.translation.translator import Translation, Translator
 from tactile_core.translation.trust_words import FIRM
 
 from .contact_rows import left_of_nothing, metrics, nearest_example
@@ -54,6 +56,16 @@ def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) 
     return found + known_rows(network, drawn["large bodies"])
 
 
+def _normal_row(answer: Translation, pairs: Pairs, of: str) -> Row:
+    """Return a row of the median angle between the skin's normals at the answer's dent and at the true one; baseline:
+    the force's direction. of : the set"""
+    true = contact_normal(true_displacement(pairs, "biotac", slice(None)), sensors.biotac_surface())
+    with np.errstate(invalid="ignore"):  # no force where nothing touches
+        ways = answer.contact_normal, answer.force / lengths(answer.force)[:, None]
+    value, baseline = (float(np.nanmedian(np.degrees(np.arccos(np.clip((way * true).sum(1), -1, 1))))) for way in ways)
+    return row("bodies_normal_deg", value, "deg", baseline=baseline, of=f"{of}; baseline: the force's direction")
+
+
 def flat_scene() -> str:
     """Return the text of a scene with bodies so large that a fingertip meets them as flat, drawn as in training."""
     text = SCENE.read_text(encoding="utf-8")
@@ -84,6 +96,7 @@ def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bo
         off, baseline = (float(np.median(errors[f"{who}_force_size_percent"][firm])) for who in ("found", "nearest"))
         over = f"{firm.sum()} over {FIRM:g} N of {of}"
         made.append(row("bodies_firm_force_percent", off, "%", baseline=baseline, of=over))
+    made.append(_normal_row(answer, pairs, of))
     true = true_displacement(pairs, "digit", slice(None))
     left, copied = (float(left_of_nothing(gel, true).mean()) for gel in (answer.displacement_digit, nearest[0]))
     return [*made, row("bodies_gel_left", left, "1", baseline=1.0, of=f"{of}; the nearest example: {copied:.2f}")]
