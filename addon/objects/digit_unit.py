@@ -139,6 +139,12 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     rendered = {thing for layer in scene.view_layers for thing in properties.rendered(layer)}
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role in ("NONE", "LED") and t in rendered]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
+    shining = [t for t in lamps if t.data.type == "POINT" and (preset != "fast" or t.tactile.role == "LED")]
+    found += [
+        f"{lamp.name}: drawn as if Normalize were on" for lamp in shining if not getattr(lamp.data, "normalize", True)
+    ]  # since Blender 4.5
+    found += [f"{lamp.name}: its light linking is left out" for lamp in shining
+              if lamp.tactile.role == "NONE" and lamp.light_linking.receiver_collection is not None]  # fmt: skip
     if preset == "fast":
         found += [f"{lamp.name}: left out by the preset fast" for lamp in lamps
                   if lamp.data.type == "POINT" and lamp.tactile.role == "NONE"]  # fmt: skip

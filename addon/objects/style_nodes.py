@@ -123,7 +123,10 @@ def _surface(style: str) -> bpy.types.NodeTree:
     given = nodes.tree.nodes.new("NodeGroupInput")
     here = nodes.output("GeometryNodeInputPosition")
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
+    # A style before this one, as dragged from the asset library, has drawn the dent larger already.
+    before = nodes.add("GeometryNodeInputNamedAttribute", DISPLACEMENT, data_type="FLOAT_VECTOR").outputs
     moved = nodes.vector("SUBTRACT", here, rest)
+    moved = nodes.output("GeometryNodeSwitch", before["Exists"], moved, before["Attribute"], input_type="VECTOR")
     kept = nodes.store(given.outputs["Geometry"], DISPLACEMENT, moved, "FLOAT_VECTOR")
     again = nodes.attribute(DISPLACEMENT, "FLOAT_VECTOR")
     ramp = nodes.add("ShaderNodeValToRGB", _SHARE[style](nodes, given.outputs[LARGEST], again))

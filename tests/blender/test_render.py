@@ -297,6 +297,16 @@ def test_hidden_leds_and_meshes_in_the_housing_are_told(ready, part, capfd):
         assert words in said.out + said.err
 
 
+def test_ways_of_light_that_are_left_out_are_said(ready, part, left_out):
+    bpy.ops.object.light_add(type="POINT")
+    bpy.context.object.light_linking.receiver_collection = bpy.data.collections.new("none of these")
+    said = [f"{bpy.context.object.name}: its light linking is left out"]
+    red = part("addon.objects.digit_body").leds_of(ready.objects["DIGIT gel"])["red"]
+    if hasattr(red.data, "normalize"):
+        red.data.normalize, said = False, [f"{red.name}: drawn as if Normalize were on", *said]
+    assert left_out() == said
+
+
 @pytest.mark.parametrize("kind", ["OPEN_EXR", "HDR", "DPX"])
 def test_linear_light_by_raw_says_how_to_look_at_it(ready, left_out, kind):
     if kind not in ready.render.image_settings.bl_rna.properties["file_format"].enum_items:

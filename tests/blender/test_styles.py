@@ -80,6 +80,9 @@ def test_a_dent_drawn_larger_leaves_the_picture_alone(gel, part, nodes_of):
     moved = np.abs(nodes_of(gel) - nodes).max()
     assert moved == pytest.approx(2e3 * np.abs(before).max(), rel=0.05)
     np.testing.assert_allclose(read(gel, bpy.context.evaluated_depsgraph_get()), before, atol=1e-8)
+    dragged = gel.modifiers.new("from the asset library", "NODES")  # the picture was that of the larger dent
+    dragged.node_group = part("addon.objects.style_nodes").group("CONTACT_PATCH")
+    np.testing.assert_allclose(read(gel, bpy.context.evaluated_depsgraph_get()), before, atol=1e-8)
 
 
 def test_styles_take_each_other_s_place(gel):
