@@ -7,7 +7,7 @@ import numpy as np
 
 from ...tactile_core.errors import TactileError
 from ..settings import properties
-from . import axes, curves, mesh_cache
+from . import axes, curves, mesh_cache, style_nodes
 
 _APPLIED = 1e-4  # m, median shift of nodes that shows a mesh moved as a whole: no dent is as wide (assumed)
 
@@ -29,10 +29,12 @@ def check_rest(*things: bpy.types.Object) -> None:
         own = np.empty(3 * len(thing.data.vertices), np.float32)
         (keys.reference_key.data if keys else thing.data.vertices).foreach_get("co", own)
         rest, nodes = properties.surface_of(thing).rest, axes.to_sensor(own.reshape(-1, 3), thing.tactile.per_metre)
-        off = np.median(np.linalg.norm(nodes - rest, axis=1)) if nodes.shape == rest.shape else 0.0
+        advice = "Undo that (Ctrl Z), or delete the sensor and import, translate or add it again"
+        if nodes.shape != rest.shape:
+            raise TactileError(thing.name, f"a mesh of {len(nodes)} vertices", f"the sensor's {len(rest)}", advice)
+        off = np.median(np.linalg.norm(nodes - rest, axis=1))
         if off > _APPLIED:
             found = f"its mesh lies {1e3 * off:.1f} mm off the sensor's own: a location, rotation or scale was applied"
-            advice = "Undo that (Ctrl Z), or delete the sensor and import, translate or add it again"
             raise TactileError(thing.name, found, "a sensor moved as an object", advice)
 
 
@@ -45,11 +47,12 @@ def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarra
     about = thing.tactile
     about.motion = motion = motion or "SHAPE_KEYS"
     about.largest = float(moved.dent.max(initial=0.0))
+    nodes = axes.to_blender(properties.surface_of(thing).rest, about.per_metre)
+    _lay_at_rest(thing.data, nodes)
     if motion == "MESH_CACHE":
         moved = mesh_cache.written(moved, properties.sensor_name(thing), about.per_metre, thing.name)
         mesh_cache.play(thing, moved.file, frames[0], frames[1] - frames[0] if len(frames) > 1 else 1.0)
         return f"{thing.name}: mesh cache {moved.file.name}"
-    nodes = axes.to_blender(properties.surface_of(thing).rest, about.per_metre)
     _write_keys(thing, nodes, axes.to_blender(moved.displacement, about.per_metre), frames)
     return f"{thing.name}: {len(frames)} shape keys"
 
@@ -68,6 +71,15 @@ def played(thing: bpy.types.Object) -> tuple[float, float] | None:
         return None
     first, last = curve.range()
     return first, last
+
+
+def _lay_at_rest(mesh: bpy.types.Mesh, nodes: np.ndarray) -> None:
+    """Put a mesh's own vertices to nodes (n, 3) in its units, and remove the dent that Blender's Convert to Mesh or an
+    applied shape key has left: styles and pictures would take it for every frame's."""
+    if style_nodes.DISPLACEMENT in mesh.attributes:
+        mesh.attributes.remove(mesh.attributes[style_nodes.DISPLACEMENT])
+    for points in (mesh.vertices, *([mesh.shape_keys.reference_key.data] if mesh.shape_keys else [])):
+        points.foreach_set("co", np.ascontiguousarray(nodes, np.float32).ravel())
 
 
 def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> None:

@@ -195,6 +195,41 @@ def test_a_gel_that_its_keys_do_not_move_is_refused(gel, part, holder, name):
         part("addon.operators.pictures").draw(gel, bpy.context.evaluated_depsgraph_get(), "fast")
 
 
+@pytest.mark.parametrize("how", ["convert", "apply"])
+def test_a_dent_that_was_made_part_of_the_mesh_goes_with_a_new_translation(gel, part, how):
+    """It was taken for every frame's dent, or for the rest that a style measures from."""
+
+    def moved(frame):
+        bpy.context.scene.frame_set(frame)
+        return part("addon.objects.digit_objects").displacement_of(gel, bpy.context.evaluated_depsgraph_get())
+
+    bpy.ops.tactile.set_style(style="DISPLACEMENT", exaggeration=3.0)
+    before = [moved(frame) for frame in (70, 80)]
+    bpy.ops.object.select_all(action="DESELECT")
+    gel.select_set(True)
+    bpy.context.view_layer.objects.active = gel
+    if how == "convert":
+        bpy.ops.object.convert(target="MESH")
+    else:
+        bpy.ops.object.shape_key_remove(all=True, apply_mix=True)
+    bpy.ops.tactile.translate()
+    np.testing.assert_allclose([moved(frame) for frame in (70, 80)], before, atol=1e-7)
+
+
+def test_a_sensor_that_lost_a_vertex_is_refused(gel):
+    """All others were moved by their neighbours' displacements, or a traceback ended it."""
+    bpy.context.view_layer.objects.active = gel
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    gel.data.vertices[5].select = True
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.delete(type="VERT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    with pytest.raises(RuntimeError, match=r"DIGIT gel: a mesh of 2866 vertices; expected the sensor's 2867"):
+        bpy.ops.tactile.translate()
+
+
 def test_a_recording_moved_after_import_is_reported(imported, tmp_path):
     moved = tmp_path / "here.h5"
     shutil.copy(RECORDING, moved)
