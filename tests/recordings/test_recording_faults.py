@@ -82,6 +82,11 @@ def test_commas_in_numbers_are_named_where_commas_separate(cell, found, slide_li
         recordings.read(write(lines))
 
 
+def test_a_quoted_comma_in_one_row_is_named(slide_lines, write):
+    slide_lines[40] = slide_lines[40].replace(",2000,", ',"2000,5",', 1)
+    assert "line 41, tac: '2000,5' is a number with a decimal comma" in recordings.read(write(slide_lines)).warnings[0]
+
+
 def test_a_row_with_too_many_cells_is_not_believed(slide_lines, write):
     slide_lines[10] = "7," + slide_lines[10] + "8"
     recording = recordings.read(write(slide_lines))

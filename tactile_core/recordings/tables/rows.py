@@ -10,7 +10,7 @@ import numpy as np
 
 from ...files.short_text import shown
 from ..assemble import Problem
-from .cells import COMMENTS, SPACE, Cells, Header, number, split
+from .cells import COMMENTS, OUTSIDE, SPACE, Cells, Header, number, split
 
 LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:([,.'’_\s])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
@@ -68,7 +68,7 @@ def _bad_row(
     for place, (name, cell) in enumerate(zip(names, cells, strict=False)):
         value = kinds.value(place, cell)
         if value is None or not -LARGEST < value < LARGEST:
-            plain = cell.strip()
+            plain = cell.strip().translate(OUTSIDE)
             found = no_number(plain) if plain else "an empty cell"
             problems.append(Problem(frame, line_number, name, found))
             value = np.nan
