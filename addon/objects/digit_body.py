@@ -57,6 +57,7 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
         for material in (digit_materials.new_coating(unit.coating), *own):  # the user's are kept, in slots of no face
             gel.data.materials.append(material)
     if first:
+        gel.tactile.calibrated = unit.unit
         for led in unit.leds:
             if led.colour not in leds_of(gel):
                 _place_led(_add_led(gel, led), gel, led, unit)
@@ -79,6 +80,7 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
 def reset(gel: bpy.types.Object, unit: Calibration) -> None:
     """Put LEDs, coating and camera back to a unit's calibration; their keys and drivers are removed."""
     add_body(gel, unit)
+    gel.tactile.calibrated = unit.unit
     for led in unit.leds:
         thing = leds_of(gel).get(led.colour) or _add_led(gel, led)
         thing.animation_data_clear(), thing.data.animation_data_clear()

@@ -97,6 +97,15 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
     }  # fmt: skip
 
 
+def mixed(gel: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
+    """Return a sentence if a gel's LEDs, coating and camera are of another unit than the scene's calibration, of which
+    the rest of its picture is: it was appended, or the preferences name another. Raises TactileError for a bad file."""
+    own, other = gel.tactile.calibrated, render_settings.calibration_of(scene, properties.sensor_name(gel)).unit
+    advice = "choose the first as Calibration, or Reset"
+    words = f"{gel.name}: its LEDs, coating and camera are of {own}, the rest of its picture of {other}: {advice}"
+    return [words] * bool(own and own != other)
+
+
 def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Start the worker of a scene's Mitsuba preset, which compiles before its first picture; not without a window.
 

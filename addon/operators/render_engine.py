@@ -53,8 +53,8 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         gel = properties.needed_gel(scene)
         size, preset = (self.resolution_x, self.resolution_y), render_settings.preset_of(scene)
         warn = functools.partial(self.report, {"WARNING"})
-        for left_out in digit_unit.left_out(scene, gel, preset):
-            warn(left_out)
+        for words in (*pictures.mixed(gel, scene), *digit_unit.left_out(scene, gel, preset)):
+            warn(words)
         self.update_stats("", f"Frame {scene.frame_current}: {preset}")
 
         for name, channels in PASSES.items():

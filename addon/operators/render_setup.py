@@ -125,6 +125,8 @@ class TACTILE_OT_set_up_render(OnGel, TactileOperator):
             words = f"{gel.name} came without its LEDs and camera: the calibration's are added"
             self.report({"WARNING"}, f"{words}. To have its own, append its collection")
         digit_body.add_body(gel, unit)
+        for words in pictures.mixed(gel, scene):
+            self.report({"WARNING"}, words)
         camera = unit.camera
         render = scene.render
         render.engine = ID

@@ -135,6 +135,10 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
         gel = properties.needed_gel(context.scene, context.object)
         shown, moved = pictures.shown_state(gel, context.evaluated_depsgraph_get())
         path = os.path.abspath(bpy.path.abspath(self.filepath))
+        others = (Path(path).with_suffix(end) for end in (".ply", ".camera.exr"))  # of which no browser asks
+        other = None if os.path.exists(path) else next((file for file in others if file.exists()), None)
+        if other is not None:
+            raise TactileError(other, "already there, of no scene of this name", "a new file", "Choose another name")
         with JobFolder() as folder:
             tracer_process.write_unit(folder, shown.unit)
             np.save(folder / "heights.npy", height_map(moved, shown.unit.camera))

@@ -241,7 +241,7 @@ def _pictures(folder: Path, options: argparse.Namespace) -> None:
     scene = bpy.context.scene
     bpy.ops.tactile.set_up_render()
     scene.tactile_render.preset, scene.tactile_render.error = options.preset, options.error
-    scene.render.filepath = str((folder / "images").resolve()) + "/"
+    scene.render.filepath, scene.render.use_overwrite = str((folder / "images").resolve()) + "/", True
     if step := parse_frames(options.frames).step:  # between two frames that were taken Blender interpolates
         scene.frame_step = step
     bpy.ops.render.render(animation=True)

@@ -129,6 +129,7 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
         " pictures of this engine. 0: the calibration's", min=0.0, max=1.0, default=0.0, options={"ANIMATABLE"},
         update=lambda about, _context: about.id_data.update_tag(),  # else Blender takes no notice
     )  # fmt: skip
+    calibrated: bpy.props.StringProperty(name="Calibrated", description="Which unit this gel's LEDs and camera are of")
     picture: bpy.props.PointerProperty(name="Picture", description="Of this gel", type=bpy.types.Image)
     heights: bpy.props.PointerProperty(name="Height Map", description="Of this gel, mm", type=bpy.types.Image)
     largest: bpy.props.FloatProperty(

@@ -38,9 +38,13 @@ def test_render_draws_the_gel_of_the_blend_s_camera(run, imported, tmp_path):
     seen, objects.active = scene.camera.name, scene.objects["DIGIT gel"]
     assert scene.camera.parent != objects.active
     scene.frame_start = scene.frame_end = 90
+    scene.render.use_overwrite = False  # --overwrite says else
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
-    assert run("render", tmp_path / "two.blend", "--out", tmp_path) == 0
-    assert bpy.context.scene.camera.name == seen
+    stale = tmp_path / "two" / "images" / "0090.png"
+    stale.parent.mkdir(parents=True)
+    stale.write_text("of a former result")
+    assert run("render", tmp_path / "two.blend", "--out", tmp_path, "--overwrite") == 0
+    assert bpy.context.scene.camera.name == seen and stale.stat().st_size > 1000
 
 
 def test_a_batch_goes_on_after_a_failure_and_names_it(run, slide_csv, tmp_path, capfd):

@@ -24,6 +24,9 @@ def test_the_picture_s_scene_is_mitsuba_s(pressed_gel, part, needs, tmp_path):
         assert (tmp_path / "blender" / name).read_bytes() == (tmp_path / "core" / name).read_bytes()
     write(tmp_path / "core" / "gel.xml", load(), heights)
     assert (tmp_path / "blender" / "gel.xml").read_bytes() != (tmp_path / "core" / "gel.xml").read_bytes()
+    (tmp_path / "mine.ply").write_text("a mesh of the user's own, which was replaced without a word")
+    with pytest.raises(RuntimeError, match=r"mine\.ply: already there"):
+        bpy.ops.tactile.export_mitsuba(filepath=str(tmp_path / "mine.xml"))
 
 
 def alembic(path, start, end):

@@ -38,7 +38,7 @@ def test_clearing_the_cache_removes_our_arrays_alone(monkeypatch, tmp_path, part
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
 
 
-def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, part, tmp_path):
+def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, part, tmp_path, capfd):
     settings = part("addon.settings.render_settings")
     own = tmp_path / "unit.toml"
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
@@ -48,6 +48,17 @@ def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, p
     preferences.calibration = str(own)
     found = settings.calibration_of(scene, "digit").leds[0].radiance
     assert found == pytest.approx(2 * shipped.leds[0].radiance, rel=1e-5)
+    # The gel's LEDs are still of the former unit, the rest of its picture is of this one.
+    bpy.ops.tactile.set_up_render()
+    scene.render.resolution_percentage = 10
+    for mixed in (2, 0):
+        capfd.readouterr()
+        bpy.ops.render.render()
+        bpy.ops.tactile.set_up_render()
+        said = capfd.readouterr()
+        words = f"camera are of {shipped.unit}, the rest of its picture of {shipped.unit}, changed"
+        assert (said.out + said.err).count(words) == mixed
+        bpy.ops.tactile.reset_to_calibration()
 
 
 def test_own_sensors_are_told_until_the_folder_is_cleared(preferences, part, tmp_path):
