@@ -126,12 +126,12 @@ def write_arrays(path, press):
     stamps = np.rint(1e9 * (START + press.time)).astype(np.int64)
     if path.suffix == ".h5":
         with h5py.File(path, "w") as file:
-            for trial, frames in (("b", slice(0, 400)), ("a", slice(None))):
+            for trial, frames in (("trial_2", slice(0, 400)), ("trial_1", slice(None))):
                 for finger in (0, 1):
                     file[f"{trial}/finger_{finger}/electrode_data"] = press.electrodes[frames] + finger
                     file[f"{trial}/finger_{finger}/pdc_data"] = press.pdc[frames]
                 file[f"{trial}/stamps"] = stamps[frames]
-            file["a/object"] = ["foam"] * len(stamps)
+            file["trial_1/object"] = ["foam"] * len(stamps)
     elif path.suffix == ".npz":
         np.savez(path, hand=np.stack([press.electrodes, press.electrodes + 1], axis=1), t_ns=stamps, pdc=press.pdc)
     elif path.suffix == ".npy":
@@ -173,6 +173,8 @@ def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
     assert not (found.flags & Flag.REPAIRED).any()
     if "npy" not in name and "no_header" not in name:
         np.testing.assert_array_equal(found.pdc, press.pdc)
+    if name == "two.h5":
+        assert list(found.labels) == ["trial_1_object"]  # no stamps and pressures of the group "trial_1"
     if name == "coarse.csv":
         np.testing.assert_allclose(found.time, press.time, atol=0.01)  # a step of the finer clock
         assert any("spread evenly" in text for text in found.warnings)
