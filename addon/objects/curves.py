@@ -66,14 +66,19 @@ def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.
         write_curve(owner, path, frames, values[:, index], index, lines)
 
 
-def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
-    """Return the values (T,) of the keyframes of the F-curve with this data path and index; (0,) if there is none."""
+def points_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
+    """Return frame and value (T, 2) of each keyframe of the F-curve with this data path and index; (0, 2) if there is
+    none."""
     curve = fcurves_of(owner).find(path, index=index)
-    if curve is None:
-        return np.zeros(0)
-    points = np.empty(2 * len(curve.keyframe_points), np.float32)
-    curve.keyframe_points.foreach_get("co", points)
-    return points[1::2]
+    points = np.empty(2 * len(curve.keyframe_points) if curve else 0, np.float32)
+    if curve is not None:
+        curve.keyframe_points.foreach_get("co", points)
+    return points.reshape(-1, 2)
+
+
+def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
+    """Return the values (T,) of the keyframes of ``points_of``."""
+    return points_of(owner, path, index)[:, 1]
 
 
 def write_properties(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:

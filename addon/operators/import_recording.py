@@ -195,9 +195,13 @@ def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.nd
     return set_style.animate(skin, found.skin, frames, skin.tactile.motion, found.columns())
 
 
-def plays(skin: bpy.types.Object, found: recording_data.Translated) -> bool:
-    """Return true if a skin has the signals and forces of ``found``; false if its unit or tare has been changed."""
-    values = found.columns()
+def plays(skin: bpy.types.Object, found: recording_data.Translated, frames: np.ndarray) -> bool:
+    """Return true if a skin has the signals and forces of ``found`` at frames (T,) of the scene; false if its unit or
+    tare has been changed, or if its keys have been shifted."""
+    values, keys = found.columns(), skin.data.shape_keys
+    timed = [curves.points_of(skin, '["force"]'), *([curves.points_of(keys, "eval_time")] if keys else [])]
+    if not all(np.array_equal(points[:, 0], frames.astype(np.float32)) for points in timed):
+        return False
     shown = {name: values[name].astype(np.float32).T for name in ("electrodes", "force")}
     return all(np.array_equal(curves.values_of(skin, f'["{name}"]', k), row) for name, rows in shown.items()
                for k, row in enumerate(rows))  # fmt: skip

@@ -85,7 +85,7 @@ class TACTILE_OT_translate(JobOperator):
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
         old = _gel_beside(context.scene, skin, self._target)
         gel = old or digit_objects.add_gel(properties.home_of(skin), skin.tactile.per_metre, skin, self._target)
-        if skin.tactile.known and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
+        if skin.tactile.known and not plays(skin, self._found, frames):  # imported, with another unit than is chosen
             play(skin, self._found, frames)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
         values = self._found.columns()

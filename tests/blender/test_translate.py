@@ -195,6 +195,16 @@ def test_a_gel_that_its_keys_do_not_move_is_refused(gel, part, holder, name):
         part("addon.operators.pictures").draw(gel, bpy.context.evaluated_depsgraph_get(), "fast")
 
 
+def test_keys_that_were_shifted_come_back_with_the_gel_s(gel, part):
+    """The gel went back to the recording's frames alone: skin and gel played apart."""
+    skin, curves = bpy.context.scene.objects["BioTac skin"], part("addon.objects.curves")
+    for owner, path in ((skin, '["force"]'), (skin.data.shape_keys, "eval_time")):
+        for point in curves.fcurves_of(owner).find(path).keyframe_points:
+            point.co.x += 50
+        bpy.ops.tactile.translate()
+        assert curves.points_of(owner, path)[0, 0] == 40
+
+
 @pytest.mark.parametrize("how", ["convert", "apply"])
 def test_a_dent_that_was_made_part_of_the_mesh_goes_with_a_new_translation(gel, part, how):
     """It was taken for every frame's dent, or for the rest that a style measures from."""
