@@ -74,6 +74,14 @@ def test_a_slip_recording_is_told_and_prepared(counts, write, capsys):
     assert largest == [str(value) for value in counts.max(axis=0)]
 
 
+def test_a_slip_recording_s_own_stamps_are_read(counts, write):
+    stamped = [[f"{1e9 + row / 50:.2f}", *each] for row, each in enumerate(counts)]
+    recording = read_sp(written(write, ["stamp", *SLIP], stamped))
+    np.testing.assert_array_equal(recording.electrodes, counts)
+    assert recording.rate == pytest.approx(50) and recording.start_time == 1e9
+    assert not recording.not_taken and not recording.labels
+
+
 def test_snapshots_of_a_grasp_are_a_recording_a_finger(counts, write):
     path = written(write, GRASP, [["ball", 1, *row, *row, *(row - 100)] for row in counts])
     assert each_finger(path) == [f"{path}#{finger}" for finger in (0, 1, 4)]

@@ -24,6 +24,7 @@ from ...sensors import ELECTRODES, SP, electrode_count
 from ..array_store import Store
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
+from ..tables.map_guess import is_time
 from ..tables.table import Table
 
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
@@ -95,22 +96,25 @@ def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: 
     """Return the recording of one finger in a table of BioTac SPs; its `about` lists the names of the other columns.
     finger : 0 first, 1 middle, 2 ring, 3 little, 4 thumb; layout : the layout's name in words
     style : format of the columns' names, by finger and electrode: "{}_e{}" for ff_e1
-    snapshots : true if frames do not follow each other in time. Raises TactileError for what `assemble` refuses."""
+    snapshots : true if frames do not follow each other in time; else a column of time is read, if there is one
+    Raises TactileError for what `assemble` refuses."""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)
+    timed = [name for name in table.header if is_time(name) and name not in table.words and not snapshots][:1]
+    used = electrodes | {*timed}
     return assemble(
         table.path,
         layout,
         electrodes=table.columns(names),
-        stamps=None,
+        stamps=table.column(timed[0]) if timed else None,
         rows=table.lines,
-        problems=table.essential(names),
+        problems=table.essential([*timed, *names]),
         row_word="line",
-        about={"finger": tuple(HAND)[finger], "labels": [name for name in table.header if name not in electrodes]},
+        about={"finger": tuple(HAND)[finger], "labels": [name for name in table.header if name not in used]},
         warnings=table.warnings,
         names=names,
-        labels=table.labels(electrodes),
+        labels=table.labels(used),
         sensor=SP,
         snapshots=snapshots,
     )
