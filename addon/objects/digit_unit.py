@@ -198,7 +198,7 @@ def _composited(scene: bpy.types.Scene) -> bool:
             if link.from_node.type == "REROUTE" and link.from_node.inputs[0] not in ends:  # they may form a circle
                 ends.append(link.from_node.inputs[0])
             if link.from_node.type == "R_LAYERS" and link.from_socket.name == "Image":
-                return False
+                return link.from_node.scene not in (None, scene)  # a group may be another scene's
     return True
 
 

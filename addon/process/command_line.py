@@ -115,6 +115,8 @@ def _found_in(folders: list[Path]) -> list[Path]:
             scene = path.is_dir() and (path / "scene.toml").is_file()
             if scene or path.suffix.lower() in (*FOLDER_ENDINGS, ".blend"):
                 found.append(path)
+            elif path.is_dir():
+                print(f"tactile: {path}: a folder, passed over; give it as an input of its own", file=sys.stderr)
     return found
 
 

@@ -53,11 +53,12 @@ def test_a_batch_goes_on_after_a_failure_and_names_it(run, slide_csv, tmp_path, 
     slide_csv("good", folder=folder)
     (folder / "bad.csv").write_text("a,b\n1,2\n")
     (folder / "notes.txt").write_text("left alone")
+    (folder / "evening").mkdir()
     assert run("batch", folder, "--out", tmp_path / "out", "--frames", "60:62") == 1
     assert (tmp_path / "out" / "good" / "good.blend").is_file() and not (tmp_path / "out" / "bad").exists()
     said = capfd.readouterr().err
     assert said.count("bad.csv: no known recording") == 1 and "Error:" not in said
-    assert "1 of 2 failed" in said and "notes" not in said
+    assert "1 of 2 failed" in said and "notes" not in said and "evening: a folder, passed over" in said
 
 
 def test_an_older_result_is_kept_unless_told(run, slide_csv, tmp_path, capfd):

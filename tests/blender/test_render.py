@@ -266,6 +266,9 @@ def test_a_compositor_that_changes_the_picture_is_said(ready, left_out):
     assert "compositor" in left_out()[0]
     tree.links.new(between.outputs[0], end.inputs[0])
     assert left_out() == []
+    layers.scene = bpy.data.scenes.new("another")
+    assert "compositor" in left_out()[0]
+    layers.scene = ready
     tree.links.new(between.outputs[0], between.inputs[0])  # a circle, in place of what is rendered
     assert "compositor" in left_out()[0]
     ready.render.use_compositing = False
