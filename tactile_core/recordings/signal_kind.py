@@ -81,7 +81,12 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
         return None
     if words:
         warnings.append(f"PDC is taken as {words}: {factor:.4g} counts a unit")
-    return factor * pdc
+    counts = factor * pdc
+    told = counts[np.isfinite(counts) & (counts != 0)]
+    if 0 < len(told) < np.isfinite(counts).sum() and np.percentile(told, 1) >= PDC_AT_REST[0]:  # untared, as no 0 is
+        warnings.append("PDC is 0 in some frames beside absolute pressures: taken as not recorded there")
+        counts = np.where(counts == 0, np.nan, counts)
+    return counts
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:

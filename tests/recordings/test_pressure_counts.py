@@ -58,6 +58,15 @@ def test_what_is_neither_is_taken_as_not_recorded():
     assert warnings == ["PDC goes beyond 12 bit, and is no pressure in Pa, hPa, kPa or psi: taken as not recorded"]
 
 
+@pytest.mark.parametrize("rest", [0, 962])
+def test_zeros_are_readings_of_tared_counts_alone(rest):
+    warnings: list[str] = []
+    pdc = np.where(np.arange(350) < 60, 0.0, rest + RISE)
+    expected = np.where(pdc == 0, np.nan, pdc) if rest else pdc
+    np.testing.assert_array_equal(in_counts(pdc, 1.0, "biotac", warnings), expected)
+    assert bool(warnings) == bool(rest)
+
+
 def test_a_recording_with_kilopascals_is_prepared_as_with_counts(shipped):
     kilo = dataclasses.replace(shipped, pdc=np.round(shipped.pdc * COUNT / 1e3, 4))
     of_counts, of_kilo = (Preparer()(each) for each in (shipped, kilo))
