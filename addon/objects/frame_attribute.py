@@ -56,8 +56,13 @@ def _remove_group(group: bpy.types.NodeTree | None) -> None:
 
 
 def modifier_of(thing: bpy.types.Object, name: str) -> bpy.types.Modifier | None:
-    """Return the modifier that gives an object the attribute ``name``; None if there is none."""
-    return thing.modifiers.get(f"Tactile {name.replace('_', ' ')}")
+    """Return the modifier that gives an object the attribute ``name``, whatever it is called; None without one."""
+    for modifier in thing.modifiers:
+        group = modifier.node_group if modifier.type == "NODES" else None
+        stores = [node for node in group.nodes if node.type == "STORE_NAMED_ATTRIBUTE"] if group else ()
+        if any(node.inputs["Name"].default_value == name for node in stores):
+            return modifier
+    return None
 
 
 def _group(

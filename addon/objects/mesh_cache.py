@@ -92,7 +92,7 @@ def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
 
 def play(thing: bpy.types.Object, file: Path, first: float, step: float) -> None:
     """Let an object play a file from the scene's frame ``first`` on; step : scene frames per frame of the file"""
-    modifier = thing.modifiers.get("Tactile") or thing.modifiers.new("Tactile", "MESH_CACHE")
+    modifier = _player(thing) or thing.modifiers.new("Tactile", "MESH_CACHE")
     thing.modifiers.move(list(thing.modifiers).index(modifier), 0)  # what it moves is what the others show
     modifier.cache_format = "PC2"
     modifier.filepath = kept_files.shown(file)
@@ -103,9 +103,13 @@ def play(thing: bpy.types.Object, file: Path, first: float, step: float) -> None
 
 def stop(thing: bpy.types.Object) -> None:
     """Let an object play no file any more."""
-    modifier = thing.modifiers.get("Tactile")
+    modifier = _player(thing)
     if modifier is not None:
         thing.modifiers.remove(modifier)
+
+
+def _player(thing: bpy.types.Object) -> bpy.types.Modifier | None:
+    return next((each for each in thing.modifiers if each.type == "MESH_CACHE"), None)  # whatever its name is now
 
 
 def check(*things: bpy.types.Object | None) -> None:

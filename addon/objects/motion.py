@@ -53,6 +53,7 @@ def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarra
         moved = mesh_cache.written(moved, properties.sensor_name(thing), about.per_metre, thing.name)
         mesh_cache.play(thing, moved.file, frames[0], frames[1] - frames[0] if len(frames) > 1 else 1.0)
         return f"{thing.name}: mesh cache {moved.file.name}"
+    mesh_cache.stop(thing)
     _write_keys(thing, nodes, axes.to_blender(moved.displacement, about.per_metre), frames)
     return f"{thing.name}: {len(frames)} shape keys"
 

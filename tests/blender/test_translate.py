@@ -195,6 +195,19 @@ def test_a_gel_that_its_keys_do_not_move_is_refused(gel, part, holder, name):
         part("addon.operators.pictures").draw(gel, bpy.context.evaluated_depsgraph_get(), "fast")
 
 
+def test_a_new_translation_plays_alone(imported):
+    """A mesh cache or contact patch whose modifier was renamed went on over it, or beside shape keys."""
+    skin = imported(frames="70:72", motion="MESH_CACHE")
+    for motion, caches in (("MESH_CACHE", 1), ("MESH_CACHE", 1), ("SHAPE_KEYS", 0)):
+        skin.tactile.motion, skin.tactile.tare = motion, "60:80" if skin.tactile.tare == "auto" else "auto"
+        bpy.ops.tactile.translate()
+        for thing in (skin, bpy.context.scene.objects["DIGIT gel"]):
+            kinds = [each.type for each in thing.modifiers]
+            assert kinds.count("MESH_CACHE") == caches and kinds.count("NODES") == 1  # contact patch, or counts
+            for modifier in thing.modifiers:
+                modifier.name = "of the user's"
+
+
 def test_keys_that_were_shifted_come_back_with_the_gel_s(gel, part):
     """The gel went back to the recording's frames alone: skin and gel played apart."""
     skin, curves = bpy.context.scene.objects["BioTac skin"], part("addon.objects.curves")
