@@ -13,6 +13,7 @@ import gc
 import importlib.util
 import os
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -71,8 +72,9 @@ class Loop:
             while first.__cause__ is not None:
                 first = first.__cause__
             raise first from None
-        except Exception:  # of numba's cache: nowhere to write, a full disk, damage; a loop's own comes again
-            if not (self._kept and available()):
+        except Exception as error:  # of numba's cache: nowhere to write, a full disk, damage
+            passed = (frame.f_code.co_filename for frame, _ in traceback.walk_tb(error.__traceback__))
+            if not (self._kept and any(Path(file).name == "caching.py" for file in passed)):
                 raise
             self._kept, self._run = False, self._first_call
             return self(*arguments)

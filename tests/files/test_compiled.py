@@ -99,6 +99,22 @@ def test_loops_are_compiled_where_they_cannot_be_kept(owner, name, failure, tmp_
     assert [doubled(np.ones(30_000)), doubled(np.ones((2, 3)))] == [60_000, 12]
 
 
+def test_a_loop_that_fails_is_not_run_again(compiled_loops, monkeypatch):
+    pytest.importorskip("numba")
+    compiled_loops(True)
+    monkeypatch.delenv(compiled.SWITCH, raising=False)
+    runs = []
+
+    @compiled.Loop
+    def failing(values):
+        runs.append(1)
+        raise TimeoutError("as an alarm's handler raises")
+
+    with pytest.raises(TimeoutError):
+        failing(np.ones(3))
+    assert len(runs) == 1
+
+
 def test_a_stop_during_a_compiled_loop_is_itself(tmp_path, monkeypatch, compiled_loops):
     pytest.importorskip("numba")
     if not hasattr(signal, "setitimer"):
