@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         if error.errno is None:
             raise  # of a library, not of the system
-        where, found = error.filename or "a file or connection", error.strerror or str(error)
+        where, found = str(error.filename or "a file or connection"), error.strerror or str(error)
         complain(str(TactileError(where, found, advice="Check paths, permissions and the disk's room")))
         return 2
     return status

@@ -58,6 +58,8 @@ class Loop:
 
     def __init__(self, function: Callable[..., Any], *, waits: bool = True) -> None:
         functools.update_wrapper(self, function)
+        # What is kept on disk names this package's modules. In Blender they have other names: each keeps its own.
+        function.__qualname__ = f"{__package__}.{function.__qualname__}"
         self._waits = waits
         self._function, self._run = function, self._first_call
         self._spent = 0.0  # s, uncompiled
@@ -65,6 +67,7 @@ class Loop:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the function, not compiled if numba is missing or switched off, or as long as compiling does not pay."""
+        kept = self._kept  # another thread may find out meanwhile
         try:
             return self._run(*arguments) if available() else self._function(*arguments)
         except SystemError as error:  # in which numba wraps, once or twice, what a signal's handler raised
@@ -74,7 +77,7 @@ class Loop:
             raise first from None
         except Exception as error:  # of numba's cache: nowhere to write, a full disk, damage
             passed = (frame.f_code.co_filename for frame, _ in traceback.walk_tb(error.__traceback__))
-            if not (self._kept and any(Path(file).name == "caching.py" for file in passed)):
+            if not (kept and any(Path(file).name == "caching.py" for file in passed)):
                 raise
             self._kept, self._run = False, self._first_call
             return self(*arguments)
@@ -83,8 +86,6 @@ class Loop:
         import numba
 
         _teach_numba()
-        # What is kept on disk names this package's modules. In Blender they have other names: each keeps its own.
-        self._function.__qualname__ = f"{__package__}.{self._function.__qualname__}"
         # numpy's rules for a division by zero; no fast-math: the same numbers on every machine of a kind.
         # Without the wrapper for callers in C compiling takes a tenth less.
         self._compiled = numba.njit(cache=self._kept, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(

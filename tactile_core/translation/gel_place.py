@@ -46,10 +46,18 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
     return center
 
 
-def contact_normal(displacement: np.ndarray, skin: Lattice) -> np.ndarray:
-    """Return the unit normal (T, 3) float32, inward, of the resting ``skin`` at a dent: that of an even object there.
+@functools.cache
+def _inward(sensor: str) -> np.ndarray:
+    """Return unit normals (n, 3), inward, at the nodes of a sensor's resting surface."""
+    surface = sensors.sensor_surface(sensor)
+    return -node_normals(surface.rest, surface.faces)
+
+
+def contact_normal(displacement: np.ndarray, sensor: str) -> np.ndarray:
+    """Return the unit normal (T, 3) float32, inward, of a sensor's resting skin at a dent: that of an even object
+    there.
     displacement : (T, n, 3) m of the skin's nodes; NaN if no node moves by 10 um"""
-    inward = -node_normals(skin.rest, skin.faces)
+    inward = _inward(sensor)
     normal = accuracy.core_center(np.einsum("tni,ni->tn", displacement, inward), inward)
     return (normal / accuracy.lengths(normal)[:, None]).astype(np.float32)
 

@@ -167,7 +167,7 @@ class Translator:
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])
-        normal = contact_normal(skin, sensors.sensor_surface(self.source))
+        normal = contact_normal(skin, self.source)
         normal[silent] = np.nan
         way = self._mounted, self.silent("digit_m"), signals.stiffness
         beside = second_contact(nets, evidence.second, silent, *way)

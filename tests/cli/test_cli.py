@@ -135,7 +135,7 @@ def test_what_the_system_refuses_is_one_line(tactile, slide_csv, tmp_path):
 
 
 def test_a_notebook_s_backend_is_not_needed(monkeypatch):
-    monkeypatch.setenv("MPLBACKEND", "module://absent.backend_inline")
+    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
     with pytest.raises(SystemExit, match="0"):
         main(["--help"])
     subprocess.run([sys.executable, "-c", "import matplotlib"], check=True, timeout=120)

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table.translation_methods import plain_signals
-from tactile_core import sensors
 from tactile_core.accuracy import Row, lengths, peak_depth_error, row
 from tactile_core.jobs import solved_gel
 from tactile_core.jobs.pairs import make_pairs
@@ -59,7 +58,7 @@ def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) 
 def _normal_row(answer: Translation, pairs: Pairs, of: str) -> Row:
     """Return a row of the median angle between the skin's normals at the answer's dent and at the true one; baseline:
     the force's direction. of : the set"""
-    true = contact_normal(true_displacement(pairs, "biotac", slice(None)), sensors.biotac_surface())
+    true = contact_normal(true_displacement(pairs, "biotac", slice(None)), "biotac")
     with np.errstate(invalid="ignore"):  # no force where nothing touches
         ways = answer.contact_normal, answer.force / lengths(answer.force)[:, None]
     value, baseline = (float(np.nanmedian(np.degrees(np.arccos(np.clip((way * true).sum(1), -1, 1))))) for way in ways)

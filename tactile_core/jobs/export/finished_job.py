@@ -152,7 +152,8 @@ def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int
         if not translate_shards.is_of(path, job, index, number, frames):
             expected_shard = f"shard {number} of {job.inputs[index].name}"
             raise TactileError(path, "another shard under this name", expected_shard, ADVICE)
-        if set(file) not in (expected, expected - {named("latent_digit", pair)}):  # a gel that was solved has no code
+        lacking = {named("latent_digit", pair), "contact_normal"}  # a solved gel has no code, an older job no normal
+        if not expected - lacking <= set(file) <= expected:
             raise TactileError(path, f"arrays {', '.join(sorted(file))}", ", ".join(sorted(expected)), ADVICE)
         for name, data in file.items():
             declared(data, f"{path}, {name}")
@@ -162,10 +163,12 @@ def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int
 
 
 def _check_alike(paths: list[Path]) -> None:
-    """Raise TactileError if an array's frames differ in shape or type between shards."""
+    """Raise TactileError if shards hold other arrays than the first, or an array's frames differ in shape or type."""
     first: dict[str, str] = {}
     for path in paths:
-        for name, found in _kinds(path).items():
-            kind = f"{found[1].name} of shape {found[0]}"
-            if first.setdefault(name, kind) != kind:
-                raise TactileError(f"{path}, {name}", f"frames are {kind}", f"{first[name]}, as in {paths[0]}", ADVICE)
+        kinds = {name: f"frames are {kind.name} of shape {shape}" for name, (shape, kind) in _kinds(path).items()}
+        first = first or kinds
+        if apart := kinds.items() ^ first.items():
+            name = min(apart)[0]
+            found, expected = (each.get(name, "absent") for each in (kinds, first))
+            raise TactileError(f"{path}, {name}", found, f"{expected}, as in {paths[0]}", ADVICE)

@@ -173,6 +173,19 @@ def test_shards_of_strangers_are_read_with_care(change, said, job, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_job_begun_before_there_were_normals_is_read_but_not_half_of_one(job, tmp_path):
+    shutil.copytree(job, tmp_path / "job")
+    first, *others = (path for one in finished_job.load(tmp_path / "job").recordings for path in one.shards)
+    for path in (first, *others):
+        with h5py.File(path, "r+") as file:
+            del file["contact_normal"]
+        checksummed.write_checksum(path)
+        if path == first:
+            with pytest.raises(TactileError, match=r"contact_normal: frames are .*; expected absent, as in "):
+                finished_job.load(tmp_path / "job")
+    export.export(tmp_path / "job", "npz", tmp_path / "out", silent)
+
+
 def test_what_a_job_did_not_keep_is_said_of_its_folder(job):
     with pytest.raises(TactileError, match=f"^{re.escape(str(job))}: holds no traction_digit"):
         finished_job.load(job).check_kept("traction_digit", "traction")
