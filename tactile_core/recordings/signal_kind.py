@@ -98,7 +98,9 @@ def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str
         return unit, ""
     parts = np.append(values - np.rint(values), 0.0 if len(values) == 1 else [])  # of one value alone it has to be 0
     whole, within = np.ptp(parts) < 1e-6, np.percentile(known, 99) <= MOST_PDC
-    fewer_bits = 1 < unit < COUNT_MAX / 100.0  # not percent, shares or volts, which are not whole
+    percent = COUNT_MAX / 100.0  # seldom whole, then told by their level; shares and volts never are
+    rests = unit == percent and PDC_AT_REST[0] <= unit * np.percentile(known, 5) <= PDC_AT_REST[1]
+    fewer_bits = 1 < unit < percent or rests
     of_electrodes = values[-1] > COUNT_MAX if unit < 1 else fewer_bits and whole and values[-1] > 0
     if of_electrodes and values[-1] <= MOST_PDC / unit:
         return unit, ""

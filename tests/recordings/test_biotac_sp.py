@@ -80,6 +80,8 @@ def test_a_slip_recording_s_own_stamps_are_read(counts, write):
     np.testing.assert_array_equal(recording.electrodes, counts)
     assert recording.rate == pytest.approx(50) and recording.start_time == 1e9
     assert not recording.not_taken and not recording.labels
+    gappy = [[row[0] * (number % 2), *row[1:]] for number, row in enumerate(stamped)]
+    assert read_sp(written(write, ["stamp", *SLIP], gappy)).rate == pytest.approx(100)  # as without them
 
 
 def test_snapshots_of_a_grasp_are_a_recording_a_finger(counts, write):

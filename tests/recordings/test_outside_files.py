@@ -132,6 +132,7 @@ def write_arrays(path, press):
                     file[f"{trial}/finger_{finger}/pdc_data"] = press.pdc[frames]
                 file[f"{trial}/stamps"] = stamps[frames]
             file["trial_1/object"] = ["foam"] * len(stamps)
+            file["trial_1/labels/grasp"] = np.arange(len(stamps)) // 100
     elif path.suffix == ".npz":
         np.savez(path, hand=np.stack([press.electrodes, press.electrodes + 1], axis=1), t_ns=stamps, pdc=press.pdc)
     elif path.suffix == ".npy":
@@ -174,7 +175,7 @@ def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
     if "npy" not in name and "no_header" not in name:
         np.testing.assert_array_equal(found.pdc, press.pdc)
     if name == "two.h5":
-        assert list(found.labels) == ["trial_1_object"]  # no stamps and pressures of the group "trial_1"
+        assert list(found.labels) == ["trial_1_labels_grasp", "trial_1_object"]  # no stamps and pressures of the group "trial_1"
     if name == "coarse.csv":
         np.testing.assert_allclose(found.time, press.time, atol=0.01)  # a step of the finer clock
         assert any("spread evenly" in text for text in found.warnings)

@@ -44,6 +44,8 @@ def test_pdc_in_the_unit_of_the_electrodes_is_told(full, rest):
     if rest:  # by its level
         assert counts_a_unit((rest + RISE + RNG.uniform(-0.5, 0.5, 350)) / unit, unit, "biotac")[0] == unit
     assert counts_a_unit(rest + RISE, unit, "biotac") == (1.0, "")
+    if rest and full == 100.0:
+        assert counts_a_unit(np.round((rest + RISE) / unit), unit, "biotac") == (unit, "")
     assert counts_a_unit(np.round((rest + RISE) * COUNT / 1e3, 4), unit, "biotac")[1] == "kPa"
 
 

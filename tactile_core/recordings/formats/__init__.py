@@ -101,7 +101,8 @@ def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: 
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)
-    timed = [name for name in table.header if is_time(name) and name not in table.words and not snapshots][:1]
+    clocks = [] if snapshots else [name for name in table.header if is_time(name) and name not in table.words]
+    timed = [name for name in clocks if np.isfinite(table.column(name)).mean() > 0.5][:1]  # not one of gaps
     used = electrodes | {*timed}
     return assemble(
         table.path,

@@ -98,7 +98,9 @@ def labels_in(store: Store, frames: int) -> dict[str, np.ndarray]:
     for name, (shape, kind) in store.shapes.items():
         if _rows(shape)[0] not in (frames, 0, 1) or prod(_rows(shape)[1]) != 1:
             continue
-        if kind.kind in "iufb" and LABEL.search(name.lower().rpartition("/")[2]):  # not of all in a group `trial_1`
+        *groups, last = name.lower().split("/")
+        named = LABEL.search(last) or {"label", "labels"} & {*groups}  # not all in a group `trial_1`
+        if kind.kind in "iufb" and named:
             texts = [f"{value:.10g}" for value in np.ravel(store.array(name, shape))]
         elif store.is_text(name):
             texts = store.texts(name)
