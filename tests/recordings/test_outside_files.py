@@ -175,7 +175,8 @@ def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
     if "npy" not in name and "no_header" not in name:
         np.testing.assert_array_equal(found.pdc, press.pdc)
     if name == "two.h5":
-        assert list(found.labels) == ["trial_1_labels_grasp", "trial_1_object"]  # no stamps and pressures of the group "trial_1"
+        # no stamps and pressures of the group trial_1
+        assert list(found.labels) == ["trial_1_labels_grasp", "trial_1_object"]
     if name == "coarse.csv":
         np.testing.assert_allclose(found.time, press.time, atol=0.01)  # a step of the finer clock
         assert any("spread evenly" in text for text in found.warnings)
