@@ -160,7 +160,8 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
     drawn = [thing.name for thing in scene.objects if thing.type in _DRAWN and thing in rendered]
     strips = getattr(scene.sequence_editor, "strips_all" if bpy.app.version >= (4, 4, 0) else "sequences_all", ())
-    drawn += ["sequencer"] * bool(scene.render.use_sequencer and len(strips))
+    seen = any(strip.type != "SOUND" and not strip.mute for strip in strips)
+    drawn += ["sequencer"] * (scene.render.use_sequencer and seen)
     found += [f"Blender draws over the picture: {', '.join(drawn)}; hide it, or switch it off"] * bool(drawn)
     words = "The compositor's nodes change the picture: join Render Layers' Image to their output"
     found += [words] * _composited(scene)

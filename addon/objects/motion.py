@@ -21,7 +21,8 @@ def check_rest(*things: bpy.types.Object) -> None:
             found = "in Edit Mode, where it is at rest"
             raise TactileError(thing.name, found, "Object Mode", "Press Tab over the 3D view")
         keys = thing.data.shape_keys
-        plays = keys and keys.animation_data  # by an action, NLA strips or a driver
+        animation = keys and keys.animation_data
+        plays = animation and (animation.action or animation.nla_tracks)
         if plays and (thing.show_only_shape_key or keys.use_relative):
             found = "one of its shape keys is pinned" if thing.show_only_shape_key else "its shape keys are relative"
             advice = "Undo that in Properties > Data > Shape Keys"

@@ -199,7 +199,8 @@ def plays(skin: bpy.types.Object, found: recording_data.Translated, frames: np.n
     """Return true if a skin has the signals and forces of ``found`` at frames (T,) of the scene; false if its unit or
     tare has been changed, or if its keys have been shifted."""
     values, keys = found.columns(), skin.data.shape_keys
-    timed = [curves.points_of(skin, '["force"]'), *([curves.points_of(keys, "eval_time")] if keys else [])]
+    own = [keys] if keys and skin.tactile.motion != "MESH_CACHE" else []
+    timed = [curves.points_of(skin, '["force"]'), *(curves.points_of(each, "eval_time") for each in own)]
     if not all(np.array_equal(points[:, 0], frames.astype(np.float32)) for points in timed):
         return False
     shown = {name: values[name].astype(np.float32).T for name in ("electrodes", "force")}

@@ -15,11 +15,12 @@ from ...tactile_core.jobs.results import parse_frames
 from ...tactile_core.recordings import readers
 from ...tactile_core.recordings.opened_file import FOLDER_ENDINGS
 from ...tactile_core.recordings.recording import name_of
-from ..settings import properties
+from ..settings import kept_files, properties
 
 DESCRIPTION = """\
 Convert recordings, simulate scenes and render pictures inside Blender, unattended. Each input gets the folder
-DIR/<its name>. An input that fails is named and does not stop the others; the exit status is then 1."""
+DIR/<its name>, each finger of a hand one of its own (hand_finger0). An input that fails is named and does not stop the
+others; the exit status is then 1."""
 EPILOG = """\
 examples:
   blender -b --command tactile convert touch.csv --out results       touch.blend: BioTac and DIGIT, animated
@@ -115,7 +116,7 @@ def _found_in(folders: list[Path]) -> list[Path]:
             scene = path.is_dir() and (path / "scene.toml").is_file()
             if scene or path.suffix.lower() in (*FOLDER_ENDINGS, ".blend"):
                 found.append(path)
-            elif path.is_dir():
+            elif path.is_dir() and path.name not in (kept_files.CACHE, kept_files.SIMULATIONS, "images"):
                 print(f"tactile: {path}: a folder, passed over; give it as an input of its own", file=sys.stderr)
     return found
 
@@ -129,7 +130,7 @@ def _fingers(path: Path) -> list[Path]:
 
 
 def _folder(out: Path, path: Path) -> Path:
-    return out / (path.parent.resolve().name if path.name == "scene.toml" else name_of(path.resolve()))
+    return out / (path.parent.resolve().name if path.name == "scene.toml" else name_of(path.resolve().as_posix()))
 
 
 def _claimed(folder: Path, options: argparse.Namespace) -> None:
@@ -141,6 +142,7 @@ def _claimed(folder: Path, options: argparse.Namespace) -> None:
 
 def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
     """Translate the recording ``path`` and write it as a .blend into a folder. options : of the command line"""
+    _refuse(path, options, "seed")
     _fresh()
     words = {
         "tare": options.tare,
@@ -152,7 +154,7 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
     }
     files = {"weights": options.weights, "columns": options.columns, "unit": options.sensor}
     words |= {name: str(file.resolve()) for name, file in files.items() if file is not None}
-    bpy.ops.tactile.import_recording(filepath=str(path.resolve()), **words)
+    bpy.ops.tactile.import_recording(filepath=path.resolve().as_posix(), **words)  # a topic keeps its slashes
     bpy.ops.tactile.translate(**({} if options.to is None else {"to": options.to.upper()}))
     _claimed(folder, options)
     _finish(folder, options)

@@ -242,8 +242,10 @@ def test_what_blender_draws_over_each_engine_s_picture_is_said(ready, left_out):
     (bpy.ops.object.grease_pencil_add if since else bpy.ops.object.gpencil_add)(type="STROKE")
     editor, long = ready.sequence_editor_create(), {"length" if bpy.app.version >= (5, 0, 0) else "frame_end": 90}
     strips = editor.strips if bpy.app.version >= (4, 4, 0) else editor.sequences
-    strips.new_effect(name="white", type="COLOR", channel=1, frame_start=1, **long)
-    ready.render.use_sequencer = True
+    white = strips.new_effect(name="white", type="COLOR", channel=1, frame_start=1, **long)
+    ready.render.use_sequencer = white.mute = True
+    assert left_out() == [f"Blender draws over the picture: {bpy.context.object.name}; hide it, or switch it off"]
+    white.mute = False
     over = f"{bpy.context.object.name}, sequencer"
     assert left_out() == [f"Blender draws over the picture: {over}; hide it, or switch it off"]
     bpy.context.object.hide_render = True
