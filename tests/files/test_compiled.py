@@ -100,7 +100,8 @@ def test_loops_are_compiled_where_they_cannot_be_kept(owner, name, failure, tmp_
 
 
 def test_a_loop_that_fails_is_not_run_again(compiled_loops, monkeypatch):
-    pytest.importorskip("numba")
+    if np.lib.NumpyVersion(np.__version__) < "2.0.0":
+        pytest.skip("numpy 1 rounds otherwise: there every loop is compiled at its first call")
     compiled_loops(True)
     monkeypatch.delenv(compiled.SWITCH, raising=False)
     runs = []
