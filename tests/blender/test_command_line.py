@@ -107,7 +107,10 @@ def test_each_finger_of_a_file_is_converted(run, slide_csv, needs, tmp_path):
 def test_options_that_would_do_nothing_are_refused(run, tmp_path, capfd):
     (tmp_path / "touch.blend").touch()
     press, out = ROOT / "scenes" / "press", ("--out", tmp_path / "out")
-    for words in (("render", tmp_path / "touch.blend", "--ball", "28"), ("simulate", press, "--frames", "0:4")):
+    for words in (
+        ("render", tmp_path / "touch.blend", "--ball", "28"), ("simulate", press, "--frames", "0:4"),
+        ("convert", tmp_path / "touch.csv", "--seed", "5"),
+    ):  # fmt: skip
         assert run(*words, *out) == 1
         assert f"{words[2]}: given for {words[1]}, to which it does nothing" in capfd.readouterr().err
     with pytest.raises(SystemExit, match="2"):

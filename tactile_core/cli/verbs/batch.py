@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
             raise TactileError("--status and --verify", "given with INPUTS", "--out DIR alone")
         job = jobs.read(folder)
         return _status(folder, job) if options.status else _verify(folder, job, options.progress)
-    engine.check_counts(options, "workers", "shard_frames")
+    engine.check_place(options, "workers", "shard_frames")
     if part is not None and not jobs.exists(folder):
         raise TactileError(folder, "no job yet", "a job that all parts share", "Make it once with --plan")
     with runs.opened(folder, part):

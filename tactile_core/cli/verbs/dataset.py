@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     unknown = [word for word in layouts if word not in LAYOUTS]
     if unknown or not layouts:
         raise TactileError("--to", repr(", ".join(unknown)), f"one or more of {', '.join(LAYOUTS)}")
-    engine.check_counts(options, "workers")
+    engine.check_place(options, "workers")
     asked = build_set.Asked(
         layouts, engine.place_of(options), say, lambda name, unit: bar(name, unit, options.progress),
         options.target, options.pictures, options.calibration, options.weights,

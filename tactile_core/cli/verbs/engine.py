@@ -44,9 +44,9 @@ def parts_arguments(verb: argparse.ArgumentParser, plan: str) -> None:
     )
 
 
-def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raise TactileError if an option is below 1 (None is allowed), and for ``--insecure`` without ``--cluster``.
-    names : whole-number attributes of options"""
+def check_place(options: argparse.Namespace, *names: str) -> None:
+    """Check where tasks run: raise TactileError for ``--insecure`` without ``--cluster``, and for a number below 1.
+    names : attributes of options that hold these numbers, or None"""
     if options.insecure and options.cluster is None:
         raise TactileError("--insecure", "no --cluster", "one beside it", "Leave --insecure out")
     for name in names:

@@ -46,7 +46,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate the paired contacts of a scene; returns the exit status."""
     one_thread()  # before numpy is imported
-    engine.check_counts(options, "workers")
+    engine.check_place(options, "workers")
     check_seed(options.seed)
     from ...jobs import pairs, plan, results
     from ...simulation.pairs_file import KEEPABLE

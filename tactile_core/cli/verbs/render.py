@@ -78,7 +78,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Render the pictures; returns the exit status."""
     one_thread()  # before numpy is imported
-    engine.check_counts(options, "workers")
+    engine.check_place(options, "workers")
     size = _size(options.size)
     if options.variant is not None and options.preset == "fast":
         raise TactileError("--variant", "given with --preset fast", "a preset of Mitsuba's", "Leave it out")

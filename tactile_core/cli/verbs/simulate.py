@@ -133,7 +133,7 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, Tier
 
 def _run_grid(options: argparse.Namespace, keep: tuple[str, ...]) -> int:
     """Simulate every scene of a grid; returns the exit status."""
-    engine.check_counts(options, "workers")
+    engine.check_place(options, "workers")
     if options.error:
         raise TactileError("--grid", "given with --error", "one of the two")
     from ...jobs import simulate
